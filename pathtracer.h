@@ -1,0 +1,6474 @@
+/* pathtracer.h - v0.1.0 - a path tracer in one C99 header: render by the rendering equation,
+   know how wrong the picture still is, and how long that took.      MIT-0 or public domain, see the end.
+
+   Do this in exactly ONE C or C++ file, and include the header plainly everywhere else:
+
+       #define PATHTRACER_IMPLEMENTATION
+       #include "pathtracer.h"
+
+   build:  cc -O2 program.c -lm -pthread          (C99 or later, C++11 or later; nothing else is needed)
+
+   A WHOLE PROGRAM (examples/minimal.c; a test takes it from here, compiles it and runs it)
+
+       #define PATHTRACER_IMPLEMENTATION
+       #include "pathtracer.h"
+
+       int main(void)
+       {
+           pt_scene scene = PT_SCENE_INIT;
+           pt_film film = PT_FILM_INIT;
+           pt_report report = PT_REPORT_INIT;
+           pt_render_desc desc = pt_render_defaults();
+
+           int white = pt_add_material(&scene, pt_material_diffuse(pt_rgb_grey(0.7f)));
+           int lamp = pt_add_material(&scene, pt_material_emitter(pt_rgb_grey(10)));
+           pt_add_sphere(&scene, pt_v3(0, 1, 0), 1, white);
+           pt_add_parallelogram(&scene, pt_v3(-4, 0, -4), pt_v3(0, 0, 8), pt_v3(8, 0, 0), white);
+           pt_add_parallelogram(&scene, pt_v3(-1, 4, -1), pt_v3(2, 0, 0), pt_v3(0, 0, 2), lamp);
+           if (pt_commit(&scene) != PT_OK) {
+               fprintf(stderr, "%s\n", pt_scene_error(&scene));
+               pt_scene_free(&scene);
+               return 1;
+           }
+
+           desc.camera = pt_camera_look_at(pt_v3(0, 1, 6), pt_v3(0, 1, 0), pt_v3(0, 1, 0), 40);
+           desc.width = 320;
+           desc.height = 240;
+           desc.spp = 64;
+           pt_result result = pt_render(&scene, &desc, &film, &report);
+           if (result == PT_OK) result = pt_write_ppm("out.ppm", &film, 1);
+           if (result == PT_OK) pt_report_print(&report, stdout);
+           else fprintf(stderr, "%s\n", pt_result_string(result));
+           pt_film_free(&film);
+           pt_report_free(&report);
+           pt_scene_free(&scene);
+           return result != PT_OK;
+       }
+
+   CONTENTS (search for the tag, [PT-07] say: its first find declares, its second implements)
+
+       [PT-00] configuration: switches, memory, results, threads, clocks
+       [PT-01] vectors, frames, colour
+       [PT-02] random numbers and samplers
+       [PT-03] statistics and Monte Carlo estimates
+       [PT-04] sampling warps, each with its density
+       [PT-05] radiometry: solid angles, irradiance, spectra
+       [PT-06] shapes and rays: intersection, error bounds, where the next ray starts
+       [PT-07] bounding volume hierarchy
+       [PT-08] materials (BSDFs)
+       [PT-09] lights
+       [PT-10] scene, camera, film
+       [PT-11] integrators: path tracing
+       [PT-17] image files: PPM, PFM, PNG
+       [PT-18] render driver: passes, threads, budgets, error against run time
+       [PT-19] canonical scenes
+
+   Sections stand in the order in which they use each other: the implementation, cut off after any
+   section, still compiles. Numbers 12 to 16 are kept free for methods that trace from the lights.
+
+   SWITCHES (define before the include, the same in every file)
+
+       PT_DOUBLE           pt_real is double instead of float: the accuracy twin
+       PT_STATIC           every function is static; implies the implementation
+       PTDEF               what stands before every public function (default: extern, or static)
+       PT_NO_THREADS       one thread, no pthread
+       PT_NO_STDIO         no FILE, no printing; implies PT_NO_FILES
+       PT_NO_FILES         no image writers
+       PT_NO_BVH           linear search instead of the tree
+       PT_NO_ENVIRONMENT   no light from the background
+       PT_NO_OBSERVER      no callback with the letters L D G S E of each path
+       PT_NO_REPORT        no rows of error against run time, no CSV, no SVG (the error estimate stays)
+       PT_NO_SCENES        no canonical scenes
+       PT_ONLY_PATH        only the method "path": implies PT_NO_OBSERVER and PT_NO_SCENES
+       PT_MALLOC(size,user) PT_REALLOC(pointer,size,user) PT_FREE(pointer,user)   all three or none
+       PT_ASSERT(x)        default: nothing
+       PT_ALLOW_FAST_MATH  lifts the refusal of -ffast-math; NaN checks and the watertight test then
+                           promise nothing
+
+   CONVENTIONS
+
+       Right-handed, y up. wo and wi are unit vectors that both point AWAY from the surface.
+       f is the BSDF without the cosine. A density says its measure in its name: _w per solid angle,
+       _a per area, _l per length. The geometric normal ng is never flipped: (v1-v0)x(v2-v0) for a
+       triangle, edge1 x edge2 for a parallelogram, from the centre for a sphere. Opaque surfaces
+       scatter on both sides; triangles and parallelograms emit on the side of ng only, spheres on
+       both. Radiance is in W sr^-1 m^-2 per colour band, linear light; image row 0 is the top.
+       Angles are in radians unless a name ends in _deg. Path length counts EDGES: 1 = an emitter
+       seen by the camera, 2 = that and direct light, k+2 = "k bounces" of the lecture slides.
+       Descriptors may be zero-initialised; zero means the default named at each field.
+
+   NUMBERS
+
+       Decisions (does this ray meet this sphere, which side of this edge) are made in double from
+       the pt_real input. No constant is tuned to the size of a scene: rays start at an offset that
+       follows from the rounding error of their own origin ([PT-06]). Sums over samples are double.
+       Build with -ffp-contract=off when two builds or two instances of the path integrator must give
+       the same bits: a fused multiply-add rounds once where two operations round twice, and a
+       compiler may fuse differently in each copy. Hits and misses of triangles do not depend on it.
+
+   WHAT IT DOES NOT DO (today)
+
+       Glossy and measured materials, textures, participating media, motion, spectra other than for
+       making RGB values, and light paths traced from the light. A point light seen through glass or
+       in a mirror, and a caustic of a point light, have probability zero in path tracing from the
+       eye: they are black, not noisy.
+
+   SOURCES
+
+       [Arv90] Arvo, Kirk: Particle Transport and Image Synthesis, 1990
+       [Arv95] Arvo: Stratified Sampling of Spherical Triangles, 1995
+       [Bur20] Burley: Practical Hash-based Owen Scrambling, JCGT 9(4), 2020
+       [Che83] Chan, Golub, LeVeque: Algorithms for Computing the Sample Variance, 1983
+       [Duf17] Duff et al.: Building an Orthonormal Basis, Revisited, JCGT 6(1), 2017
+       [Hai19] Haines, Guenther, Akenine-Moeller: Precision Improvements for Ray/Sphere Intersection,
+               Ray Tracing Gems ch. 7, 2019
+       [Ize13] Ize: Robust BVH Ray Traversal, JCGT 2(2), 2013
+       [Joe08] Joe, Kuo: Constructing Sobol Sequences with Better Two-Dimensional Projections, 2008
+       [Kaj86] Kajiya: The Rendering Equation, 1986
+       [Ken13] Kensler: Correlated Multi-Jittered Sampling, Pixar memo 13-01, 2013
+       [Lam60] Lambert: Photometria, 1760 (polygon irradiance; see Arvo, Applications of Irradiance
+               Tensors, 1995)
+       [One14] O'Neill: PCG, a Family of Better Random Number Generators, 2014
+       [Oos83] Van Oosterom, Strackee: The Solid Angle of a Plane Triangle, 1983
+       [PBR]   Pharr, Jakob, Humphreys: Physically Based Rendering, 4th edition, 2023
+       [Shi97] Shirley, Chiu: A Low Distortion Map Between Disk and Square, 1997
+       [Ste11] Stafford: Better Bit Mixing, 2011 (finaliser used by Java's SplittableRandom)
+       [Ure13] Urena, Fajardo, King: An Area-Preserving Parametrization for Spherical Rectangles, 2013
+       [Vea97] Veach: Robust Monte Carlo Methods for Light Transport Simulation, 1997
+       [Veg21] Vegdahl: Building a Better LK Hash, 2021
+       [Vos91] Vose: A Linear Algorithm for Generating Random Numbers with a Given Distribution, 1991
+       [Woo13] Woop, Benthin, Wald: Watertight Ray/Triangle Intersection, JCGT 2(1), 2013
+*/
+
+#ifndef PATHTRACER_H
+#define PATHTRACER_H
+
+/* =====================================================================================================
+   [PT-00] CONFIGURATION: declarations
+   ===================================================================================================== */
+
+#define PT_VERSION_MAJOR 0
+#define PT_VERSION_MINOR 1
+#define PT_VERSION_PATCH 0
+#define PT_VERSION_STRING "0.1.0"
+
+#if (defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ > 0)) && \
+    !defined(PT_ALLOW_FAST_MATH)
+#error "pathtracer.h: -ffast-math removes the checks for NaN and the guarantees of [PT-06]; see PT_ALLOW_FAST_MATH"
+#endif
+
+/* The switches, normalised once: below this table only PTI_HAS_X is asked. */
+#ifdef PT_ONLY_PATH
+#define PT_NO_OBSERVER
+#define PT_NO_SCENES
+#define PTI_HAS_ALL_METHODS 0
+#else
+#define PTI_HAS_ALL_METHODS 1
+#endif
+#if defined(PT_NO_STDIO) && !defined(PT_NO_FILES)
+#define PT_NO_FILES
+#endif
+#ifdef PT_NO_THREADS
+#define PTI_HAS_THREADS 0
+#elif defined(__unix__) || defined(__APPLE__) || defined(_WIN32)
+#define PTI_HAS_THREADS 1
+#else
+#define PTI_HAS_THREADS 0
+#endif
+#ifdef PT_NO_STDIO
+#define PTI_HAS_STDIO 0
+#else
+#define PTI_HAS_STDIO 1
+#endif
+#ifdef PT_NO_FILES
+#define PTI_HAS_FILES 0
+#else
+#define PTI_HAS_FILES 1
+#endif
+#ifdef PT_NO_BVH
+#define PTI_HAS_BVH 0
+#else
+#define PTI_HAS_BVH 1
+#endif
+#ifdef PT_NO_ENVIRONMENT
+#define PTI_HAS_ENVIRONMENT 0
+#else
+#define PTI_HAS_ENVIRONMENT 1
+#endif
+#ifdef PT_NO_OBSERVER
+#define PTI_HAS_OBSERVER 0
+#else
+#define PTI_HAS_OBSERVER 1
+#endif
+#ifdef PT_NO_REPORT
+#define PTI_HAS_REPORT 0
+#else
+#define PTI_HAS_REPORT 1
+#endif
+#ifdef PT_NO_SCENES
+#define PTI_HAS_SCENES 0
+#else
+#define PTI_HAS_SCENES 1
+#endif
+
+#ifdef PT_STATIC
+#ifndef PATHTRACER_IMPLEMENTATION
+#define PATHTRACER_IMPLEMENTATION
+#endif
+#endif
+
+/* Strict -std=c99 hides POSIX clocks. Where no libc header has been read yet, ask for them; elsewhere the
+   wall clock falls back to whole seconds, and pt_report says so (wall_resolution). */
+#if defined(PATHTRACER_IMPLEMENTATION) && defined(__STRICT_ANSI__) && !defined(_POSIX_C_SOURCE) && \
+    !defined(_FEATURES_H) && !defined(_GNU_SOURCE) && (defined(__unix__) || defined(__APPLE__))
+#define _POSIX_C_SOURCE 200809L
+#endif
+
+#include <stddef.h>
+#include <stdint.h>
+#include <math.h>
+#include <string.h>
+#if PTI_HAS_STDIO
+#include <stdio.h>
+#endif
+
+#ifndef PTDEF
+#ifdef PT_STATIC
+#if defined(__GNUC__)
+#define PTDEF static __attribute__((unused))
+#else
+#define PTDEF static
+#endif
+#else
+#define PTDEF extern
+#endif
+#endif
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* The working precision: float, or double with PT_DOUBLE. */
+#ifdef PT_DOUBLE
+typedef double pt_real;
+#else
+typedef float pt_real;
+#endif
+
+/* What a function that can fail returns. */
+typedef enum pt_result {
+    PT_OK = 0,
+    PT_ERROR_ARGUMENT,      /* an argument outside its documented range                                    */
+    PT_ERROR_MEMORY,        /* an allocation failed; everything of the call was freed                      */
+    PT_ERROR_SCENE,         /* the scene is wrong; pt_scene_error() names the item                         */
+    PT_ERROR_NOT_COMMITTED, /* the scene was changed, or never committed, since pt_commit                  */
+    PT_ERROR_LEFT_OUT,      /* the scene or call needs what a PT_NO_X switch left out                      */
+    PT_ERROR_CANCELLED,     /* the callback asked to stop; finished passes are in the film                 */
+    PT_ERROR_MISMATCH,      /* films that do not belong together, or whose samples overlap                 */
+    PT_ERROR_FILE           /* a file could not be written; nothing stands under its name that is not whole */
+} pt_result;
+
+/* The name of a result as a short sentence. Never NULL, also for values outside the enum. */
+PTDEF const char *pt_result_string(pt_result result);
+
+/* Wall-clock seconds since an arbitrary start; monotonic where the system has such a clock. */
+PTDEF double pt_wall_seconds(void);
+
+/* CPU seconds that this process has used so far, over all its threads. */
+PTDEF double pt_cpu_seconds(void);
+
+/* The step of pt_wall_seconds in seconds: 1e-9 usually, 1 where only time() is visible (see the note on
+   -std=c99 above). */
+PTDEF double pt_wall_resolution(void);
+
+/* How many threads this machine can run at once; 1 without threads or where it cannot be found out. */
+PTDEF int pt_hardware_threads(void);
+
+/* =====================================================================================================
+   [PT-01] VECTORS, FRAMES, COLOUR: declarations
+   ===================================================================================================== */
+
+typedef struct pt_vec2 {
+    pt_real x, y;
+} pt_vec2;
+
+typedef struct pt_vec3 {
+    pt_real x, y, z;
+} pt_vec3;
+
+/* Three bands of linear light: radiance, reflectance or a weight. Not a vector in space. */
+typedef struct pt_rgb {
+    pt_real r, g, b;
+} pt_rgb;
+
+/* The same in double: what sums over edges, samples or pixels. */
+typedef struct pt_rgbd {
+    double r, g, b;
+} pt_rgbd;
+
+/* An orthonormal right-handed frame; n is the local z axis. */
+typedef struct pt_frame {
+    pt_vec3 s, t, n;
+} pt_frame;
+
+#define PT_PI 3.14159265358979323846
+
+static inline pt_vec2 pt_v2(pt_real x, pt_real y)
+{
+    pt_vec2 v;
+    v.x = x;
+    v.y = y;
+    return v;
+}
+
+static inline pt_vec3 pt_v3(pt_real x, pt_real y, pt_real z)
+{
+    pt_vec3 v;
+    v.x = x;
+    v.y = y;
+    v.z = z;
+    return v;
+}
+
+static inline pt_vec3 pt_v3_add(pt_vec3 a, pt_vec3 b) { return pt_v3(a.x + b.x, a.y + b.y, a.z + b.z); }
+static inline pt_vec3 pt_v3_sub(pt_vec3 a, pt_vec3 b) { return pt_v3(a.x - b.x, a.y - b.y, a.z - b.z); }
+static inline pt_vec3 pt_v3_scale(pt_vec3 a, pt_real k) { return pt_v3(a.x * k, a.y * k, a.z * k); }
+static inline pt_vec3 pt_v3_neg(pt_vec3 a) { return pt_v3(-a.x, -a.y, -a.z); }
+static inline pt_real pt_v3_dot(pt_vec3 a, pt_vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+static inline pt_vec3 pt_v3_cross(pt_vec3 a, pt_vec3 b)
+{
+    return pt_v3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
+}
+
+/* Euclidean length. Overflows or underflows where the square of a component does. */
+PTDEF pt_real pt_v3_length(pt_vec3 a);
+
+/* a / |a|, computed in double so that every non-zero finite float vector has a direction; the zero vector
+   stays zero. */
+PTDEF pt_vec3 pt_v3_normalize(pt_vec3 a);
+
+/* An orthonormal frame around the unit vector n, for every n including (0,0,-1) and signed zeros
+   [Duf17]. */
+PTDEF pt_frame pt_frame_from_normal(pt_vec3 n);
+
+/* From frame coordinates to world coordinates, and back. */
+static inline pt_vec3 pt_frame_to_world(const pt_frame *f, pt_vec3 v)
+{
+    return pt_v3_add(pt_v3_add(pt_v3_scale(f->s, v.x), pt_v3_scale(f->t, v.y)), pt_v3_scale(f->n, v.z));
+}
+static inline pt_vec3 pt_frame_to_local(const pt_frame *f, pt_vec3 v)
+{
+    return pt_v3(pt_v3_dot(f->s, v), pt_v3_dot(f->t, v), pt_v3_dot(f->n, v));
+}
+
+static inline pt_rgb pt_rgb3(pt_real r, pt_real g, pt_real b)
+{
+    pt_rgb c;
+    c.r = r;
+    c.g = g;
+    c.b = b;
+    return c;
+}
+static inline pt_rgb pt_rgb_grey(pt_real v) { return pt_rgb3(v, v, v); }
+static inline pt_rgb pt_rgb_add(pt_rgb a, pt_rgb b) { return pt_rgb3(a.r + b.r, a.g + b.g, a.b + b.b); }
+static inline pt_rgb pt_rgb_mul(pt_rgb a, pt_rgb b) { return pt_rgb3(a.r * b.r, a.g * b.g, a.b * b.b); }
+static inline pt_rgb pt_rgb_scale(pt_rgb a, pt_real k) { return pt_rgb3(a.r * k, a.g * k, a.b * k); }
+static inline pt_real pt_rgb_max(pt_rgb a)
+{
+    pt_real m = a.r > a.g ? a.r : a.g;
+    return m > a.b ? m : a.b;
+}
+static inline pt_rgbd pt_rgbd3(double r, double g, double b)
+{
+    pt_rgbd c;
+    c.r = r;
+    c.g = g;
+    c.b = b;
+    return c;
+}
+
+/* Luminance Y of linear sRGB (IEC 61966-2-1 primaries, D65 white): the middle row of the RGB to XYZ matrix;
+   white (1,1,1) has luminance 1. */
+PTDEF double pt_luminance(double r, double g, double b);
+
+/* The sRGB transfer curve from linear light to the encoded value, both in [0,1] [IEC 61966-2-1]. */
+PTDEF double pt_srgb_encode(double linear);
+
+/* Linear light to an 8-bit sRGB code: clipped to [0,1], rounded to nearest; NaN and negative give 0,
+   +infinity gives 255. */
+PTDEF unsigned char pt_srgb_byte(double linear);
+
+/* =====================================================================================================
+   [PT-02] RANDOM NUMBERS AND SAMPLERS: declarations
+   ===================================================================================================== */
+
+/* PCG32 [One14], XSH-RR with 64 bits of state: the published generator and stream. */
+typedef struct pt_pcg32 {
+    uint64_t state, inc;
+} pt_pcg32;
+
+/* Seeds as pcg32_srandom_r(seed, stream) does. */
+PTDEF pt_pcg32 pt_pcg32_make(uint64_t seed, uint64_t stream);
+/* The next 32 random bits. */
+PTDEF uint32_t pt_pcg32_next(pt_pcg32 *rng);
+/* Skips delta draws in O(log delta); a negative step is its two's complement. */
+PTDEF void pt_pcg32_advance(pt_pcg32 *rng, uint64_t delta);
+/* The next number in [0,1), from 53 random bits (two draws). */
+PTDEF double pt_pcg32_double(pt_pcg32 *rng);
+
+/* Mixes 64 bits: a bijection in which each input bit flips each output bit with probability near 1/2
+   [Ste11]. */
+PTDEF uint64_t pt_hash64(uint64_t x);
+
+/* The top bits of a random word as a number in [0,1), never 1: 24 bits for float, 32 for double. */
+PTDEF pt_real pt_real_from_u32(uint32_t x);
+
+/* Point n (0-based, binary order) of dimension d = 0..3 of the Sobol sequence with the direction numbers of
+   [Joe08], as a 32-bit fraction. */
+PTDEF uint32_t pt_sobol_u32(uint32_t n, int d);
+
+/* Owen scrambling of a 32-bit fraction by hashing: flips each bit by a random function of the bits above it
+   and of the seed [Bur20, Veg21]. */
+PTDEF uint32_t pt_owen_scramble(uint32_t x, uint32_t seed);
+
+typedef enum pt_sampler_kind {
+    PT_SAMPLER_SOBOL = 0,   /* Owen-scrambled Sobol points in padded sets of four dimensions               */
+    PT_SAMPLER_INDEPENDENT, /* a hash of (seed, stream, sample, dimension): counter-based, no state        */
+    PT_SAMPLER_STRATIFIED,  /* jittered strata in 1-D and 2-D; needs the number of samples beforehand      */
+    PT_SAMPLER_GIVEN        /* numbers that the caller supplies (a Markov chain, a test)                   */
+} pt_sampler_kind;
+
+/* A source of uniform numbers for one sample of one stream (a pixel, say). Dimension d of sample i of
+   stream s depends only on (kind, seed, s, i, d), so samples may be taken in any order on any thread.
+   Make one with pt_sampler_make; the fields are for reading. */
+typedef struct pt_sampler {
+    pt_sampler_kind kind;
+    uint32_t count;          /* samples per stream; only PT_SAMPLER_STRATIFIED uses it                     */
+    uint64_t seed, key;      /* the seed, and its hash with the stream                                     */
+    uint32_t index;          /* which sample of the stream                                                 */
+    uint32_t dimension;      /* the next dimension                                                         */
+    uint32_t set, set_index; /* Sobol: the padded set in use (plus one) and its shuffled index             */
+    const double *given;     /* PT_SAMPLER_GIVEN: the numbers,                                             */
+    size_t given_count;      /*   how many there are,                                                      */
+    size_t given_missing;    /*   and how many draws went beyond them (answered by independent numbers)    */
+} pt_sampler;
+
+/* A sampler of one of the first three kinds. count is the number of samples that each stream will get
+   (PT_SAMPLER_STRATIFIED; 0 is taken as 1), and is ignored by the others. */
+PTDEF pt_sampler pt_sampler_make(pt_sampler_kind kind, uint64_t seed, uint32_t count);
+/* A sampler that hands out u[0], u[1], ... (each in [0,1)); the array stays the caller's. */
+PTDEF pt_sampler pt_sampler_make_given(const double *u, size_t count);
+/* Begins sample `index` of `stream`, at dimension 0. */
+PTDEF void pt_sampler_start(pt_sampler *s, uint64_t stream, uint32_t index);
+/* Goes to a dimension, so that each decision has its own one whatever was drawn before it. */
+PTDEF void pt_sampler_seek(pt_sampler *s, uint32_t dimension);
+/* The next one, or two, numbers in [0,1). A pair is well spread in 2-D if it starts at an even dimension. */
+PTDEF pt_real pt_sampler_1d(pt_sampler *s);
+PTDEF pt_vec2 pt_sampler_2d(pt_sampler *s);
+
+/* Which dimension decides what. Edges count from 1. */
+#define PT_DIM_FILM 0u                                       /* 2: position within the pixel             */
+#define PT_DIM_LENS 2u                                       /* 2: position on the lens                  */
+#define PT_DIM_EDGE(k) (4u + 8u * (uint32_t)((k) - 1))       /* decisions at the end of edge k, plus:    */
+#define PT_DIM_BSDF 0u                                       /*   2: direction from the BSDF             */
+#define PT_DIM_LIGHT 2u                                      /*   2: point on the light                  */
+#define PT_DIM_LIGHT_CHOICE 4u                               /*   1: which light                         */
+#define PT_DIM_LOBE 5u                                       /*   1: which lobe of the BSDF              */
+#define PT_DIM_ROULETTE 6u                                   /*   1: Russian roulette                    */
+
+/* =====================================================================================================
+   [PT-03] STATISTICS AND ESTIMATES: declarations
+   ===================================================================================================== */
+
+/* Running moments of a sample; mergeable, in double. Start from PT_STATS_INIT. */
+typedef struct pt_stats {
+    double n;          /* how many values                                                                  */
+    double mean;       /* their mean                                                                       */
+    double m2, m3;     /* sums of the 2nd and 3rd powers of deviations from the mean                       */
+} pt_stats;
+
+#ifdef __cplusplus
+#define PTI_ZERO_INIT {}
+#else
+#define PTI_ZERO_INIT {0}
+#endif
+#define PT_STATS_INIT PTI_ZERO_INIT
+
+/* Adds one value (Welford's update, with the third moment). */
+PTDEF void pt_stats_add(pt_stats *s, double x);
+/* Adds all of b to a, as if a had seen b's values [Che83]. */
+PTDEF void pt_stats_merge(pt_stats *a, const pt_stats *b);
+/* Unbiased variance of one value, standard error of the mean, sample skewness; 0 where n is too small. */
+PTDEF double pt_stats_variance(const pt_stats *s);
+PTDEF double pt_stats_standard_error(const pt_stats *s);
+PTDEF double pt_stats_skewness(const pt_stats *s);
+
+/* Upper tail P(X > x) of the standard normal, Student's t with df > 0, and chi-squared with df > 0 degrees
+   of freedom; relative accuracy holds far into the tail. */
+PTDEF double pt_normal_sf(double x);
+PTDEF double pt_student_sf(double x, double df);
+PTDEF double pt_chi2_sf(double x, double df);
+/* The x with pt_normal_sf(x) = p, for p in (0,1). */
+PTDEF double pt_normal_isf(double p);
+
+/* An integrand on the unit cube: u holds `dimensions` numbers in [0,1). */
+typedef double (*pt_integrand)(const double *u, void *user);
+
+/* What an estimate of an integral reports. */
+typedef struct pt_estimate {
+    double value, standard_error; /* the mean, and the standard deviation of that mean                     */
+    double evaluations;           /* how often the integrand was called                                    */
+    double seconds;               /* CPU seconds                                                           */
+} pt_estimate;
+
+/* Integrates f over the unit cube by the mean of n values. For Sobol and stratified points the n values are
+   split into 32 independent randomisations of n/32 points each, whose spread gives the standard error.
+   dimensions in [1,64], n >= 32. */
+PTDEF pt_result pt_estimate_mean(pt_integrand f, void *user, int dimensions, uint32_t n, pt_sampler_kind kind,
+                                 uint64_t seed, pt_estimate *out);
+
+/* =====================================================================================================
+   [PT-04] SAMPLING WARPS: declarations. u is uniform on [0,1)^2; local directions have z along the axis.
+   ===================================================================================================== */
+
+/* Uniform point of the unit disk by the concentric map [Shi97]; density 1/pi per area. */
+PTDEF pt_vec2 pt_warp_disk(pt_vec2 u);
+/* Uniform direction of the hemisphere z >= 0; density 1/(2 pi) per solid angle. */
+PTDEF pt_vec3 pt_warp_hemisphere(pt_vec2 u);
+PTDEF pt_real pt_warp_hemisphere_pdf_w(pt_vec3 w);
+/* Cosine-weighted direction of the hemisphere (Malley); density cos/pi. z is never below 2^-24 (float). */
+PTDEF pt_vec3 pt_warp_cosine(pt_vec2 u);
+PTDEF pt_real pt_warp_cosine_pdf_w(pt_vec3 w);
+/* Uniform direction of the sphere; density 1/(4 pi). */
+PTDEF pt_vec3 pt_warp_sphere(pt_vec2 u);
+PTDEF pt_real pt_warp_sphere_pdf_w(void);
+/* Uniform direction of the cone around +z with 1 - cos(half angle) = omc in (0,2]; density 1/(2 pi omc).
+   Takes 1 - cos rather than cos, because cos of a small angle has lost it. */
+PTDEF pt_vec3 pt_warp_cone(pt_vec2 u, double omc);
+PTDEF double pt_warp_cone_pdf_w(double omc);
+/* Uniform point of a triangle as barycentric weights of its second and third corner; density 1/area. */
+PTDEF pt_vec2 pt_warp_triangle(pt_vec2 u);
+
+/* A triangle seen from a point, to sample by solid angle. */
+typedef struct pt_spherical_triangle {
+    double a[3], b[3], t[3];  /* directions to corners a and b; unit tangent at a of the arc from a to c    */
+    double arc;               /* length of that arc                                                        */
+    double ab1, triple, bt;   /* 1 + a.b, |a.(b x t)|, b.t                                                 */
+    double solid_angle;       /* sr, in [0, 4 pi)                                                          */
+} pt_spherical_triangle;
+
+/* Prepares; returns the solid angle in sr, 0 if p lies in the plane of the triangle or the triangle has no
+   area. Relative accuracy holds for tiny triangles too. */
+PTDEF double pt_spherical_triangle_make(pt_spherical_triangle *s, pt_vec3 p, pt_vec3 v0, pt_vec3 v1, pt_vec3 v2);
+/* A direction uniform over the triangle; density 1/solid_angle. */
+PTDEF pt_vec3 pt_spherical_triangle_sample(const pt_spherical_triangle *s, pt_vec2 u);
+
+/* A rectangle seen from a point, to sample by solid angle [Ure13]. */
+typedef struct pt_spherical_rectangle {
+    double x[3], y[3], z[3];  /* frame: the edges, and the normal towards p                                */
+    double x0, x1, y0, y1, z0;
+    double b0, b1, k;
+    double solid_angle;       /* sr, in [0, 2 pi)                                                          */
+} pt_spherical_rectangle;
+
+/* Prepares for the rectangle corner + s e1 + t e2, 0 <= s, t <= 1, e1 perpendicular to e2. Returns the solid
+   angle, 0 if p lies in its plane. */
+PTDEF double pt_spherical_rectangle_make(pt_spherical_rectangle *s, pt_vec3 p, pt_vec3 corner, pt_vec3 e1,
+                                         pt_vec3 e2);
+/* A direction uniform over the rectangle; density 1/solid_angle. */
+PTDEF pt_vec3 pt_spherical_rectangle_sample(const pt_spherical_rectangle *s, pt_vec2 u);
+
+/* A table that draws index i with probability weight[i] / sum of weights in constant time [Vos91]. */
+typedef struct pt_alias_entry {
+    double threshold;  /* keep this index if the remainder of u is below,                                  */
+    double pmf;        /* its probability,                                                                 */
+    uint32_t alias;    /* else take this one                                                               */
+} pt_alias_entry;
+typedef struct pt_alias {
+    pt_alias_entry *entries;
+    uint32_t count;
+} pt_alias;
+
+/* Builds a table over `count` weights, finite and >= 0. All zero, or count 0: an empty table (count = 0). */
+PTDEF pt_result pt_alias_make(pt_alias *table, const double *weights, uint32_t count, void *alloc_user);
+/* Draws an index of a non-empty table with u in [0,1); *pmf is its probability, never 0. */
+PTDEF uint32_t pt_alias_sample(const pt_alias *table, double u, double *pmf);
+PTDEF void pt_alias_free(pt_alias *table, void *alloc_user);
+
+/* =====================================================================================================
+   [PT-05] RADIOMETRY: declarations
+   ===================================================================================================== */
+
+/* Solid angle in sr of a cap of half angle theta in [0, pi], and of a triangle seen from p [Oos83]. */
+PTDEF double pt_solid_angle_cap(double theta);
+PTDEF double pt_solid_angle_triangle(pt_vec3 p, pt_vec3 v0, pt_vec3 v1, pt_vec3 v2);
+
+/* Irradiance in W/m^2 at distance d from a point source of radiant intensity I W/sr; cos_theta at the
+   receiver. */
+PTDEF double pt_irradiance_point(double intensity, double d, double cos_theta);
+/* ... from a sphere of radius r and uniform radiance L whose centre is at distance d > r in a direction with
+   cosine cos_theta; the whole sphere must be above the receiver's horizon. */
+PTDEF double pt_irradiance_sphere(double radiance, double r, double d, double cos_theta);
+/* ... on the axis of a facing disk of radius r at distance h, receiver parallel to it. */
+PTDEF double pt_irradiance_disk(double radiance, double r, double h);
+/* ... at p with normal n from a polygon of uniform radiance, by Lambert's formula [Lam60], the part below the
+   horizon cut off. Both sides of the polygon count as emitting. count in [3, 32]. */
+PTDEF double pt_irradiance_polygon(double radiance, pt_vec3 p, pt_vec3 n, const pt_vec3 *v, int count);
+
+/* A spectrum as a table: value[i] at wavelength nm[i], rising; linear in between. */
+typedef struct pt_spectrum {
+    const double *nm, *value;
+    int count;
+    int zero_outside; /* outside the table: 0 = the end values go on, 1 = nothing                          */
+} pt_spectrum;
+
+/* The value at a wavelength in nm. */
+PTDEF double pt_spectrum_at(const pt_spectrum *s, double nm);
+/* CIE 1931 2-degree colour matching functions at nm (360..830, zero outside), from the 5 nm table by cubic
+   interpolation; and the relative power of illuminant D65, 100 at 560 nm. */
+PTDEF void pt_cie_xyz(double nm, double xyz[3]);
+PTDEF double pt_cie_d65(double nm);
+/* XYZ (Y = 1 for white) to linear sRGB; may be negative outside the gamut. */
+PTDEF pt_rgbd pt_xyz_to_rgb(const double xyz[3]);
+/* A reflectance spectrum to the RGB that it has under D65: XYZ by 1 nm sums, Y of a perfect white = 1. */
+PTDEF pt_rgbd pt_reflectance_to_rgb(const pt_spectrum *reflectance);
+/* An emission spectrum to RGB, normalised so that the constant spectrum 1 has Y = 1. */
+PTDEF pt_rgbd pt_emission_to_rgb(const pt_spectrum *emission);
+
+/* =====================================================================================================
+   [PT-06] SHAPES AND RAYS: declarations
+   ===================================================================================================== */
+
+/* o + t d for 0 < t < tmax (tmax itself excluded). d need not have unit length; t is in units of d. */
+typedef struct pt_ray {
+    pt_vec3 o, d;
+    pt_real tmax;
+} pt_ray;
+
+typedef enum pt_shape { PT_SHAPE_TRIANGLE = 0, PT_SHAPE_PARALLELOGRAM, PT_SHAPE_SPHERE } pt_shape;
+
+/* Where a ray met a surface. */
+typedef struct pt_hit {
+    pt_real t;
+    pt_vec3 p, p_error;  /* the point, and a bound of its rounding error per coordinate                    */
+    pt_vec3 ng, ns;      /* unit geometric and shading normal, the second on the side of the first         */
+    pt_vec2 uv;          /* texture coordinates; barycentric or edge weights where a mesh has none         */
+    pt_real u, v;        /* position within the primitive: weights of corners 2 and 3, of edge 1 and 2     */
+    int primitive;       /* number in the committed scene                                                  */
+    pt_shape shape;
+    int material;        /* index of its material                                                          */
+    int light;           /* index of its light, -1 if it does not emit                                     */
+} pt_hit;
+
+/* Unit roundoff of pt_real, and Higham's gamma(n) = n u / (1 - n u): n roundings change a value by no more
+   than this relative amount. */
+PTDEF double pt_gamma(int n);
+
+/* A ray from a point known up to p_error, on the side of ng into which w points. The origin is moved along
+   ng by the error bound and rounded away from the surface, so that it cannot meet that surface again by
+   rounding. */
+PTDEF pt_ray pt_spawn_ray(pt_vec3 p, pt_vec3 p_error, pt_vec3 ng, pt_vec3 w);
+/* The same from p towards q, both ends moved off their surfaces; d = q - p and tmax = 1. A point without a
+   surface (a point light) has nq = 0 and q_error = 0. */
+PTDEF pt_ray pt_spawn_ray_to(pt_vec3 p, pt_vec3 p_error, pt_vec3 np, pt_vec3 q, pt_vec3 q_error, pt_vec3 nq);
+
+/* Does the ray meet the sphere? t in (0, tmax). */
+PTDEF int pt_intersect_sphere(const pt_ray *ray, pt_vec3 centre, pt_real radius, double *t);
+/* Does the ray meet the triangle? Watertight: two triangles that share an edge (the same two points) leave no
+   gap [Woo13]. Edges and corners count as inside, a triangle seen edge-on does not. b: weights of corners 2
+   and 3. */
+PTDEF int pt_intersect_triangle(const pt_ray *ray, pt_vec3 v0, pt_vec3 v1, pt_vec3 v2, double *t, double b[2]);
+/* May the ray meet the box lo..hi? Conservative: never says no where exact arithmetic says yes. */
+PTDEF int pt_intersect_box(const pt_ray *ray, pt_vec3 lo, pt_vec3 hi);
+
+/* =====================================================================================================
+   [PT-07] BOUNDING VOLUME HIERARCHY: declarations
+   ===================================================================================================== */
+
+#if PTI_HAS_BVH
+/* An inner node has count 0 and its children at first and first + 1; a leaf has `count` entries of the
+   tree's order array from `first`. */
+typedef struct pt_bvh_node {
+    pt_vec3 lo, hi;
+    uint32_t first, count;
+} pt_bvh_node;
+
+/* A binary tree over boxes, built top down by the surface area heuristic with bins. */
+typedef struct pt_bvh {
+    pt_bvh_node *nodes;
+    uint32_t *order;     /* permutation of the primitives, leaf by leaf                                    */
+    uint32_t node_count, primitive_count;
+    int depth;           /* edges from the root to the deepest leaf; at most PT_BVH_MAX_DEPTH              */
+} pt_bvh;
+
+#define PT_BVH_MAX_DEPTH 64
+
+/* Builds over `count` boxes: lo[i] <= hi[i], all finite. O(n log n), deterministic. count 0 gives an empty
+   tree. */
+PTDEF pt_result pt_bvh_build(pt_bvh *bvh, const pt_vec3 *lo, const pt_vec3 *hi, uint32_t count,
+                             void *alloc_user);
+PTDEF void pt_bvh_free(pt_bvh *bvh, void *alloc_user);
+#endif
+
+/* =====================================================================================================
+   [PT-08] MATERIALS: declarations
+   ===================================================================================================== */
+
+typedef enum pt_material_kind {
+    PT_MATERIAL_DIFFUSE = 0, /* Lambert: f = albedo / pi, on both sides                                    */
+    PT_MATERIAL_MIRROR,      /* perfect mirror on both sides, reflectance = albedo                         */
+    PT_MATERIAL_DIELECTRIC   /* smooth glass: exact Fresnel reflection and refraction                      */
+} pt_material_kind;
+
+/* What a surface is made of. Zero is a black diffuse surface. */
+typedef struct pt_material {
+    pt_material_kind kind;
+    pt_rgb albedo;           /* reflectance in [0,1]; 0 = black. Dielectric: not used                      */
+    pt_rgb emission;         /* emitted radiance >= 0, W sr^-1 m^-2; 0 = does not emit                     */
+    pt_real ior;             /* index of refraction inside over outside, > 0; 0 = 1.5. Dielectric only     */
+    int medium_inside;       /* medium ids of the two sides of the surface; 0 = vacuum. Stored for the     */
+    int medium_outside;      /*   volumetric methods; must be 0 as long as there are none                  */
+} pt_material;
+
+PTDEF pt_material pt_material_diffuse(pt_rgb albedo);
+/* Emission with black albedo. */
+PTDEF pt_material pt_material_emitter(pt_rgb radiance);
+PTDEF pt_material pt_material_mirror(pt_rgb reflectance);
+PTDEF pt_material pt_material_dielectric(pt_real ior);
+
+/* Kinds of scattering. Each lobe of a BSDF has one letter of the light-path alphabet. */
+enum {
+    PT_LOBE_DIFFUSE = 1,   /* D */
+    PT_LOBE_GLOSSY = 2,    /* G */
+    PT_LOBE_SPECULAR = 4,  /* S: a delta distribution; eval and pdf of it are 0 everywhere                 */
+    PT_LOBE_ALL = 7
+};
+
+/* What is transported along wo: radiance (paths from the eye) or importance (paths from a light). Refraction
+   scales radiance by the squared ratio of indices, importance not [Vea97] 5.2. */
+typedef enum pt_transport { PT_RADIANCE = 0, PT_IMPORTANCE } pt_transport;
+
+/* A material at a point. */
+typedef struct pt_bsdf {
+    const pt_material *material;
+    pt_frame frame;          /* around the shading normal                                                  */
+    pt_vec3 ng;              /* decides which side a direction is on                                       */
+    unsigned lobes;          /* which PT_LOBE_X it has                                                     */
+} pt_bsdf;
+
+/* One sampled direction. */
+typedef struct pt_bsdf_sample_result {
+    pt_vec3 wi;              /* where the path goes on (unit)                                              */
+    pt_rgb weight;           /* f |cos| / pdf: the factor of the throughput                                */
+    pt_real pdf_w;           /* density of wi per solid angle; for a delta lobe its probability            */
+    pt_real pdf_rev_w;       /* the same with wo and wi exchanged                                          */
+    unsigned lobe;           /* which PT_LOBE_X was sampled                                                */
+    pt_real eta;             /* index on the side of wi over that of wo; 1 for reflection                  */
+} pt_bsdf_sample_result;
+
+/* The BSDF of a material at a hit. */
+PTDEF pt_bsdf pt_bsdf_make(const pt_material *m, const pt_hit *hit);
+/* f(wo, wi) in 1/sr, without cosine, summed over the lobes of the mask. Delta lobes give 0. */
+PTDEF pt_rgb pt_bsdf_eval(const pt_bsdf *b, pt_vec3 wo, pt_vec3 wi, pt_transport mode, unsigned lobes);
+/* Density per solid angle with which pt_bsdf_sample, given wo, draws wi; 0 for delta lobes. */
+PTDEF pt_real pt_bsdf_pdf_w(const pt_bsdf *b, pt_vec3 wo, pt_vec3 wi, pt_transport mode);
+/* Draws wi; u_lobe chooses the lobe, u the direction. 0: nothing was sampled (the path ends). */
+PTDEF int pt_bsdf_sample(const pt_bsdf *b, pt_vec3 wo, pt_real u_lobe, pt_vec2 u, pt_transport mode,
+                         pt_bsdf_sample_result *out);
+
+/* Fresnel reflectance of unpolarised light at a smooth dielectric: cos_i in [0,1], eta = index on the far
+   side over that on the near side, > 0. *cos_t: cosine of refraction, 0 at total reflection (result 1). */
+PTDEF double pt_fresnel_dielectric(double cos_i, double eta, double *cos_t);
+
+/* =====================================================================================================
+   [PT-09] LIGHTS: declarations
+   ===================================================================================================== */
+
+typedef enum pt_light_kind {
+    PT_LIGHT_AREA = 0,       /* an emissive primitive                                                      */
+    PT_LIGHT_POINT,          /* intensity I W/sr in all directions                                         */
+    PT_LIGHT_ENVIRONMENT     /* constant radiance from infinity                                            */
+} pt_light_kind;
+
+/* A light of the committed scene. */
+typedef struct pt_light {
+    pt_light_kind kind;
+    int primitive;           /* area: which one                                                            */
+    pt_vec3 position;        /* point                                                                      */
+    pt_rgb emission;         /* radiance, or intensity of a point light                                    */
+    double area;             /* area: m^2                                                                  */
+    double pmf;              /* probability to be chosen: its share of the power                           */
+} pt_light;
+
+/* Light that arrives at a point from one sampled direction. */
+typedef struct pt_light_sample_result {
+    pt_vec3 wi;              /* unit direction from the point to the light                                 */
+    pt_vec3 p, p_error, n;   /* the point on the light and its normal; n = 0 for a point light             */
+    pt_real distance;        /* to p; larger than the scene for the environment                            */
+    pt_rgb radiance;         /* what arrives if nothing is in between; point: I / d^2                      */
+    pt_real pdf_w;           /* density per solid angle given this light; 1 for a point light              */
+    int delta;               /* 1: no other technique can find this light                                  */
+} pt_light_sample_result;
+
+/* Light that leaves a light. */
+typedef struct pt_light_emission_result {
+    pt_vec3 p, p_error, n;   /* where (n = 0 for a point light)                                            */
+    pt_vec3 w;               /* and into which direction                                                   */
+    pt_rgb radiance;         /* emitted radiance, or intensity of a point light                            */
+    double pdf_a;            /* density of p per area; 1 for a point light. Environment: on the disk       */
+    double pdf_w;            /* density of w per solid angle given p                                       */
+    double cos_n;            /* |w . n|; 1 for a point light and the environment                           */
+} pt_light_emission_result;
+
+/* =====================================================================================================
+   [PT-10] SCENE, CAMERA, FILM: declarations
+   ===================================================================================================== */
+
+typedef struct pt_triangle {
+    uint32_t v[3];           /* indices of positions                                                       */
+    int material;
+    int mesh;                /* which mesh it came with                                                    */
+} pt_triangle;
+
+/* Per-vertex data of a mesh: add the offset to an index of positions; none if has_x is 0. */
+typedef struct pt_mesh {
+    int64_t normal_offset, uv_offset;
+    int has_normals, has_uvs;
+} pt_mesh;
+
+typedef struct pt_sphere {
+    pt_vec3 centre;
+    pt_real radius;
+    int material;
+} pt_sphere;
+
+typedef struct pt_parallelogram {
+    pt_vec3 corner, edge1, edge2;
+    int material;
+} pt_parallelogram;
+
+typedef struct pt_point_light {
+    pt_vec3 position;
+    pt_rgb intensity;
+} pt_point_light;
+
+/* One entry of the committed scene's list of primitives: a kind and an index into the array of that kind. */
+typedef struct pt_primitive {
+    pt_shape shape;
+    uint32_t index;
+    int light;               /* -1 if it does not emit                                                     */
+} pt_primitive;
+
+/* What a scene uses; pt_scene_needs returns the union. */
+enum {
+    PT_NEEDS_TRIANGLES = 1 << 0,
+    PT_NEEDS_PARALLELOGRAMS = 1 << 1,
+    PT_NEEDS_SPHERES = 1 << 2,
+    PT_NEEDS_SHADING_NORMALS = 1 << 3,
+    PT_NEEDS_UVS = 1 << 4,
+    PT_NEEDS_DIFFUSE = 1 << 5,
+    PT_NEEDS_MIRROR = 1 << 6,
+    PT_NEEDS_DIELECTRIC = 1 << 7,
+    PT_NEEDS_AREA_LIGHTS = 1 << 8,
+    PT_NEEDS_POINT_LIGHTS = 1 << 9,
+    PT_NEEDS_ENVIRONMENT = 1 << 10,
+    PT_NEEDS_BVH = 1 << 11
+};
+
+/* A scene: add to it, pt_commit it, render it, free it. Start from PT_SCENE_INIT. The fields are for reading,
+   but alloc_user, which is handed to PT_MALLOC and its kin. */
+typedef struct pt_scene {
+    void *alloc_user;
+    /* added by the user */
+    pt_material *materials;
+    pt_vec3 *positions, *normals;
+    pt_vec2 *uvs;
+    pt_triangle *triangles;
+    pt_mesh *meshes;
+    pt_sphere *spheres;
+    pt_parallelogram *parallelograms;
+    pt_point_light *point_lights;
+    uint32_t material_count, position_count, normal_count, uv_count, triangle_count, mesh_count, sphere_count,
+        parallelogram_count, point_light_count;
+    uint32_t material_capacity, position_capacity, normal_capacity, uv_capacity, triangle_capacity,
+        mesh_capacity, sphere_capacity, parallelogram_capacity, point_light_capacity;
+    pt_rgb environment;
+    /* made by pt_commit */
+    pt_primitive *primitives;
+    pt_light *lights;
+    uint32_t primitive_count, light_count;
+    pt_alias light_table;
+#if PTI_HAS_BVH
+    pt_bvh bvh;
+#endif
+    pt_vec3 lo, hi;          /* bounds of all primitives                                                   */
+    uint32_t degenerate_count; /* triangles and parallelograms without area: left out, never hit           */
+    unsigned needs;
+    int environment_light;   /* its light index, -1 without                                                */
+    int committed;
+    pt_result error;
+    char error_text[160];
+} pt_scene;
+
+#define PT_SCENE_INIT PTI_ZERO_INIT
+
+/* Each returns the new item's id (>= 0), or -1 and leaves the scene's first error in pt_scene_error. All
+   numbers must be finite; coordinates at most PT_MAX_COORDINATE in magnitude. */
+PTDEF int pt_add_material(pt_scene *scene, pt_material material);
+PTDEF int pt_add_triangle(pt_scene *scene, pt_vec3 v0, pt_vec3 v1, pt_vec3 v2, int material);
+/* Four corners in order, as the triangles (v0,v1,v2) and (v0,v2,v3). Returns the first triangle's id. */
+PTDEF int pt_add_quad(pt_scene *scene, pt_vec3 v0, pt_vec3 v1, pt_vec3 v2, pt_vec3 v3, int material);
+PTDEF int pt_add_parallelogram(pt_scene *scene, pt_vec3 corner, pt_vec3 edge1, pt_vec3 edge2, int material);
+/* radius > 0 */
+PTDEF int pt_add_sphere(pt_scene *scene, pt_vec3 centre, pt_real radius, int material);
+/* An indexed mesh: 3 * triangle_count indices below vertex_count. normals and uvs have vertex_count entries
+   or are NULL; normals need not be unit, but not zero. Everything is copied. Returns the mesh's id. */
+PTDEF int pt_add_mesh(pt_scene *scene, const pt_vec3 *positions, const pt_vec3 *normals, const pt_vec2 *uvs,
+                      uint32_t vertex_count, const uint32_t *indices, uint32_t triangle_count, int material);
+/* intensity >= 0 in W/sr */
+PTDEF int pt_add_point_light(pt_scene *scene, pt_vec3 position, pt_rgb intensity);
+#if PTI_HAS_ENVIRONMENT
+/* Constant radiance >= 0 from every direction that leaves the scene. Returns 0, or -1. */
+PTDEF int pt_set_environment(pt_scene *scene, pt_rgb radiance);
+#endif
+
+/* Coordinates, edges and radii beyond this are refused: squares of distances must stay in range, and a
+   float has no digits left for a picture there. */
+#define PT_MAX_COORDINATE 1e18
+
+/* Makes the scene ready: primitives, lights, tree, needs mask. May be called again after additions. Returns
+   the scene's first error. A scene without any primitive is allowed. */
+PTDEF pt_result pt_commit(pt_scene *scene);
+/* The first error as a sentence that names the item: "material 3: ior -1 is not positive". Never NULL. */
+PTDEF const char *pt_scene_error(const pt_scene *scene);
+/* The PT_NEEDS_X mask of a committed scene, and the same in words, written to buffer and returned. */
+PTDEF unsigned pt_scene_needs(const pt_scene *scene);
+PTDEF const char *pt_scene_needs_string(const pt_scene *scene, char *buffer, size_t size);
+/* Frees everything; the scene is as PT_SCENE_INIT made it, alloc_user kept. */
+PTDEF void pt_scene_free(pt_scene *scene);
+
+/* The nearest hit in (0, tmax), with everything filled in. Equal distances: the lower primitive wins. */
+PTDEF int pt_intersect(const pt_scene *scene, const pt_ray *ray, pt_hit *hit);
+/* Is there any hit in (0, tmax)? */
+PTDEF int pt_occluded(const pt_scene *scene, const pt_ray *ray);
+
+/* Chooses a light by power, u in [0,1). -1 if the scene has none. */
+PTDEF int pt_light_choose(const pt_scene *scene, pt_real u, pt_real *pmf);
+/* Samples the light as seen from p; 0 if it cannot light p (behind it, no extent). Area lights by solid
+   angle. */
+PTDEF int pt_light_sample(const pt_scene *scene, int light, pt_vec3 p, pt_vec2 u, pt_light_sample_result *out);
+/* The density per solid angle at p with which pt_light_sample finds what a ray from p hit: `hit` on an area
+   light, or NULL for the environment. Without the probability of the choice. */
+PTDEF pt_real pt_light_pdf_w(const pt_scene *scene, int light, pt_vec3 p, const pt_hit *hit);
+/* Samples a ray that leaves the light: a point with u_p, a direction with u_w, u_side chooses the side of a
+   sphere. */
+PTDEF int pt_light_sample_le(const pt_scene *scene, int light, pt_vec2 u_p, pt_vec2 u_w, pt_real u_side,
+                             pt_light_emission_result *out);
+/* Its two densities, for emission from point p with normal n into w. */
+PTDEF void pt_light_pdf_le(const pt_scene *scene, int light, pt_vec3 n, pt_vec3 w, double *pdf_a,
+                           double *pdf_w);
+/* Radiance that hit's surface emits towards wo. */
+PTDEF pt_rgb pt_hit_emission(const pt_scene *scene, const pt_hit *hit, pt_vec3 wo);
+
+/* A pinhole or thin-lens camera. Image points have x from the left, y from the top, both in [0,1]. */
+typedef struct pt_camera {
+    pt_vec3 position, right, up, forward; /* unit, right = forward x up                                    */
+    pt_real tan_half;        /* tangent of half the vertical field of view; 0 = not set                    */
+    pt_real lens_radius;     /* 0 = pinhole                                                                */
+    pt_real focus_distance;  /* of the plane in focus, along forward; 0 = 1                                */
+    pt_real near_distance;   /* nothing nearer than this, along forward, is seen; 0 = everything is        */
+} pt_camera;
+
+/* From eye towards target, `up` upwards in the picture (not parallel to the view), vfov_deg in (0,180). A
+   camera that cannot be made has tan_half 0, which pt_render refuses. */
+PTDEF pt_camera pt_camera_look_at(pt_vec3 eye, pt_vec3 target, pt_vec3 up, pt_real vfov_deg);
+/* The ray through image point (x,y) of a picture with aspect = width / height; lens in [0,1)^2. */
+PTDEF pt_ray pt_camera_ray(const pt_camera *camera, pt_real aspect, pt_real x, pt_real y, pt_vec2 lens);
+
+/* What a point p sends to the camera. */
+typedef struct pt_camera_we_result {
+    pt_vec3 wi;              /* unit direction from p to the lens                                          */
+    pt_vec3 lens;            /* the point on the lens                                                      */
+    pt_real x, y;            /* image point                                                                */
+    double distance;
+    double we;               /* importance, 1/(sr m^2), such that a picture of constant radiance L measures
+                                L in the mean over the image                                               */
+    double pdf_w;            /* density per solid angle at p with which the lens point was sampled: for a
+                                pinhole distance^2 / cos (a point has density 1), so that
+                                beta f |cos| we / pdf_w is the contribution                                */
+    double cos_lens;
+} pt_camera_we_result;
+
+/* Importance of the camera at p [Vea97] 8.3, [PBR] 16.1.1. 0: p is not in the picture. */
+PTDEF int pt_camera_we(const pt_camera *camera, pt_real aspect, pt_vec3 p, pt_vec2 lens,
+                       pt_camera_we_result *out);
+/* Densities of a camera ray: of its lens point per area (1 for a pinhole) and of its direction. */
+PTDEF void pt_camera_pdf(const pt_camera *camera, pt_real aspect, pt_vec3 direction, double *pdf_a,
+                         double *pdf_w);
+
+/* A range of sample indices, the end excluded. */
+typedef struct pt_range {
+    uint32_t begin, end;
+} pt_range;
+
+/* Sums per pixel, row by row from the top, three values each. Samples with even index go to half A, odd ones
+   to half B; the halves are independent, so that their difference tells the error. Start from
+   PT_FILM_INIT. */
+typedef struct pt_film {
+    void *alloc_user;
+    double *half[2];         /* width * height * 3 sums                                                    */
+    double *splat[2];        /* contributions of light paths, NULL without; same scale                     */
+    double *albedo, *normal; /* width * height * 3 sums over all samples, NULL unless asked for            */
+    double *depth;           /* width * height                                                             */
+    int width, height;
+    uint32_t samples[2];     /* per pixel, in each half                                                    */
+    pt_range *ranges;        /* which samples are in: disjoint, rising                                     */
+    uint32_t range_count, range_capacity;
+    uint64_t fingerprint;    /* of scene, camera, method, sampler, seed, precision, version                */
+    uint64_t nonfinite;      /* contributions that were NaN or infinite and counted as zero                */
+} pt_film;
+
+#define PT_FILM_INIT PTI_ZERO_INIT
+
+/* A contribution of a light path to a pixel. */
+typedef struct pt_splat {
+    uint32_t pixel;
+    uint32_t half;
+    pt_rgb value;
+} pt_splat;
+
+/* Contributions collected by one task; lists are added to the film in the order of the tasks, so the sums do
+   not depend on which thread ran which. Start from all zero. */
+typedef struct pt_splat_list {
+    void *alloc_user;
+    pt_splat *items;
+    size_t count, capacity;
+} pt_splat_list;
+
+#define PT_SPLAT_LIST_INIT PTI_ZERO_INIT
+
+/* An empty film of width x height pixels, each in [1, 65536]. aov != 0 adds albedo, normal and depth. Frees
+   what the film held. */
+PTDEF pt_result pt_film_make(pt_film *film, int width, int height, int aov);
+/* The value of a pixel: the mean over all samples, splats included. */
+PTDEF pt_rgbd pt_film_pixel(const pt_film *film, int x, int y);
+/* All samples per pixel. */
+PTDEF uint32_t pt_film_spp(const pt_film *film);
+/* Notes that samples begin..end are in. Refuses overlap. */
+PTDEF pt_result pt_film_add_range(pt_film *film, uint32_t begin, uint32_t end);
+/* Adds the sums of b to a. Both must have the same size and fingerprint, and no sample in common. */
+PTDEF pt_result pt_film_merge(pt_film *a, const pt_film *b);
+/* Appends to a list; grows it. */
+PTDEF pt_result pt_splat_add(pt_splat_list *list, uint32_t pixel, uint32_t half, pt_rgb value);
+/* Adds a list to the film's splat layer (made on first use). */
+PTDEF pt_result pt_film_add_splats(pt_film *film, const pt_splat_list *list);
+PTDEF void pt_splat_list_free(pt_splat_list *list);
+PTDEF void pt_film_free(pt_film *film);
+
+/* How wrong a picture is. rmse: root of the mean squared error over pixels and bands. relmse: mean of
+   (I-R)^2 / (R^2 + (0.1 * mean luminance of R)^2). relmse_001: mean of (I-R)^2 / (R^2 + 0.01). */
+typedef struct pt_error {
+    double rmse, relmse, relmse_001;
+} pt_error;
+
+/* The error estimated from the two halves, without a reference: nA nB / (nA + nB)^2 * (A-B)^2 is an unbiased
+   estimate of a pixel's squared error. It cannot see what both halves miss. 0 if unknown (one half empty). */
+PTDEF int pt_film_error_estimate(const pt_film *film, pt_error *out);
+/* The error against a reference picture of the same size (rows from the top, RGB). */
+PTDEF void pt_film_error(const pt_film *film, const float *reference, pt_error *out);
+
+/* =====================================================================================================
+   [PT-11] INTEGRATORS: declarations
+   ===================================================================================================== */
+
+typedef enum pt_roulette {
+    PT_ROULETTE_THROUGHPUT = 0, /* survive with min(1 - 2^-24, largest band of throughput, corrected for eta^2)  */
+    PT_ROULETTE_CONSTANT,       /* survive with roulette_survival, as the slides' P_RR                       */
+    PT_ROULETTE_NONE            /* only max_edges ends a path: needs max_edges > 0                           */
+} pt_roulette;
+
+typedef enum pt_heuristic { PT_HEURISTIC_POWER = 0, PT_HEURISTIC_BALANCE } pt_heuristic;
+
+#if PTI_HAS_OBSERVER
+/* Told of each contribution to a path's radiance, for light-path expressions: `word` reads from the light to
+   the eye over L D G S E ("LDDE"), `value` is already weighted. Paths of more than PT_WORD_MAX edges keep
+   their last letters before the eye and begin with '*'. Values of one path sum to its radiance up to
+   rounding; observing changes no random number. */
+typedef void (*pt_observer)(void *user, const char *word, int edges, pt_rgbd value);
+#define PT_WORD_MAX 60
+#endif
+
+/* How to follow a path; zero is the default. */
+typedef struct pt_li_options {
+    int max_edges;              /* 0 = no limit; see CONVENTIONS                                           */
+    pt_roulette roulette;
+    pt_real roulette_survival;  /* PT_ROULETTE_CONSTANT: in (0, 1); 0 = 0.8                                */
+    int roulette_start;         /* edges before the first roulette, >= 1; 0 = 1 if constant, else 3        */
+    pt_heuristic heuristic;     /* of multiple importance sampling                                         */
+    const volatile int *cancel; /* when it becomes non-zero, long paths end (NULL = never)                 */
+#if PTI_HAS_OBSERVER
+    pt_observer observer;       /* NULL = none. Called from the rendering threads                          */
+    void *observer_user;
+#endif
+} pt_li_options;
+
+/* What else is known of a path. */
+typedef struct pt_li_info {
+    uint64_t rays;              /* rays traced, shadow rays included (added to)                            */
+    int edges;                  /* edges of the path, shadow edges not counted                             */
+    int cancelled;              /* 1: ended by *cancel; the result means nothing                           */
+    int hit;                    /* 1: the first ray met a surface, and these are set:                      */
+    pt_rgb albedo;
+    pt_vec3 normal;
+    pt_real depth;
+} pt_li_info;
+
+/* Estimates the radiance that arrives along a ray. The one signature of every camera-path method. */
+typedef pt_rgbd (*pt_li_fn)(const pt_scene *scene, const pt_ray *ray, pt_sampler *sampler,
+                            const pt_li_options *options, pt_li_info *info);
+
+/* Path tracing [Kaj86] with light sampling and BSDF sampling combined by multiple importance sampling. */
+PTDEF pt_rgbd pt_li_path(const pt_scene *scene, const pt_ray *ray, pt_sampler *sampler,
+                         const pt_li_options *options, pt_li_info *info);
+#if PTI_HAS_ALL_METHODS
+/* Plain: light is found by hitting it only. Point lights are never found. */
+PTDEF pt_rgbd pt_li_path_plain(const pt_scene *scene, const pt_ray *ray, pt_sampler *sampler,
+                               const pt_li_options *options, pt_li_info *info);
+/* Light sampling only: a light that is hit counts only where it could not be sampled (seen directly or after
+   a delta lobe). */
+PTDEF pt_rgbd pt_li_path_light(const pt_scene *scene, const pt_ray *ray, pt_sampler *sampler,
+                               const pt_li_options *options, pt_li_info *info);
+#endif
+
+/* The weight of technique 1 with density p1 against technique 2 with density p2, as a ratio that cannot
+   overflow [Vea97] 9.2. p1 = 0 gives 0. */
+PTDEF double pt_mis_weight(double p1, double p2, pt_heuristic heuristic);
+
+/* =====================================================================================================
+   [PT-17] IMAGE FILES: declarations
+   ===================================================================================================== */
+
+#if PTI_HAS_FILES
+/* Write the film's picture times `exposure` under `path`: to a temporary name beside it first, then renamed,
+   so that no partial file ever stands there.
+   PPM: binary P6, 8 bits, sRGB transfer, clipped. PFM: linear float, rows from the bottom, little-endian.
+   PNG: 8 bits, sRGB. */
+PTDEF pt_result pt_write_ppm(const char *path, const pt_film *film, double exposure);
+PTDEF pt_result pt_write_pfm(const char *path, const pt_film *film);
+PTDEF pt_result pt_write_png(const char *path, const pt_film *film, double exposure);
+/* The same from plain arrays: rows from the top, three bytes or three floats a pixel. */
+PTDEF pt_result pt_write_ppm_bytes(const char *path, const unsigned char *rgb, int width, int height);
+PTDEF pt_result pt_write_png_bytes(const char *path, const unsigned char *rgb, int width, int height);
+PTDEF pt_result pt_write_pfm_floats(const char *path, const float *rgb, int width, int height);
+#endif
+
+/* =====================================================================================================
+   [PT-18] RENDER DRIVER: declarations
+   ===================================================================================================== */
+
+/* A rendering method: a row of pt_methods. */
+typedef struct pt_method {
+    const char *name;
+    const char *summary;
+    pt_li_fn li;                /* camera-path methods: the general body                                   */
+    unsigned handles;           /* PT_NEEDS_X of scenes it can render; the rest is black or missing        */
+} pt_method;
+
+/* All methods of this build; pt_method_count of them. The first is the default. */
+PTDEF const pt_method *pt_methods(int *count);
+/* By name, NULL if there is none. */
+PTDEF const pt_method *pt_method_find(const char *name);
+
+/* State of a running render, for the callback. */
+typedef struct pt_progress {
+    double spp, spp_target;     /* samples per pixel done so far (with the part of the running pass), and the
+                                   goal; 0 if no count is known                                            */
+    double seconds;             /* wall seconds since the start                                            */
+    double seconds_left;        /* estimate; -1 = unknown                                                  */
+    double rays_per_second;
+    double relmse;              /* latest estimate; -1 = unknown                                           */
+} pt_progress;
+
+/* Runs task(context, i) for every i in 0..count-1, in any order, on any threads, and returns when all are
+   done. A user's own thread pool provides one. */
+typedef void (*pt_parallel_fn)(void *user, int count, void (*task)(void *context, int index), void *context);
+
+/* What to render; zero means the default named. pt_render_defaults() is all zero but the spp. */
+typedef struct pt_render_desc {
+    pt_camera camera;           /* required                                                                */
+    int width, height;          /* pixels; 0 = 256                                                         */
+    uint32_t spp;               /* samples per pixel, the most if another budget is set too; 0 = no limit,
+                                   if another budget is set, else 64                                       */
+    double seconds;             /* wall seconds; 0 = no limit. Budgets end at whole passes                 */
+    double cpu_seconds;         /* CPU seconds of the process; 0 = no limit                                */
+    double target_error;        /* stop when sqrt(estimated relmse) is below; 0 = no limit. Stopping by an
+                                   estimate biases the result by O(1/n)                                    */
+    uint32_t first_sample;      /* index of the first sample: a shard of a larger picture; 0               */
+    const char *method;         /* NULL = "path"                                                           */
+    pt_sampler_kind sampler;    /* 0 = Sobol                                                               */
+    uint64_t seed;              /* every value, 0 too, is a seed                                           */
+    pt_li_options li;
+    int threads;                /* 0 = as many as the machine has                                          */
+    int tile;                   /* edge of a tile in pixels; 0 = 16. No influence on the picture           */
+    int aov;                    /* 1: also albedo, normal and depth                                        */
+    int single_net;             /* 1: all samples in one half: better Sobol points, no error estimate      */
+    int general_body;           /* 1: always the general instance of the integrator (for comparison)       */
+    const float *reference;     /* a converged picture, width * height * 3, for the true error; NULL       */
+    double reference_mse_001;   /* that reference's own error, subtracted from relmse_001                  */
+    pt_parallel_fn parallel;    /* NULL = own threads                                                      */
+    void *parallel_user;
+    int (*progress)(void *user, const pt_progress *progress); /* about ten times a second, from one thread
+                                   at a time; non-zero cancels: the running pass is dropped                */
+    void *progress_user;
+} pt_render_desc;
+
+/* One row of error against run time, cumulative since the start of the render. */
+typedef struct pt_report_row {
+    uint32_t spp;
+    double cpu_seconds, wall_seconds;
+    uint64_t rays;
+    int estimated;              /* 1: the error is estimated from the halves, 0: unknown                   */
+    pt_error error;             /* estimated                                                               */
+    double efficiency;          /* 1 / (relmse * CPU seconds), of the true error if there is a reference   */
+    int has_true_error;         /* 1: a reference was given                                                */
+    pt_error true_error;
+} pt_report_row;
+
+/* What a render tells of itself. Start from PT_REPORT_INIT; a second render starts it anew. */
+typedef struct pt_report {
+    void *alloc_user;
+    pt_report_row *rows;        /* after 1, 2, 4, ... samples, and at the end                              */
+    uint32_t row_count, row_capacity;
+    int width, height, threads;
+    uint32_t spp;               /* samples per pixel reached                                               */
+    double cpu_seconds, wall_seconds, wall_resolution;
+    uint64_t rays;
+    uint64_t nonfinite;         /* contributions that were NaN or infinite, counted as zero                */
+    const char *method, *sampler, *stopped_by, *body; /* static strings                                    */
+    unsigned needs;
+} pt_report;
+
+#define PT_REPORT_INIT PTI_ZERO_INIT
+
+/* All defaults: spp 64, the rest zero. */
+PTDEF pt_render_desc pt_render_defaults(void);
+/* Renders a committed scene. film: an empty one is made; a film of the same fingerprint whose samples end
+   where first_sample begins is continued, and then spp counts all samples; anything else is
+   PT_ERROR_MISMATCH. report may be NULL. On PT_ERROR_CANCELLED the film holds all finished passes.
+   film = function of (scene, camera, method, options, seed, sample range): the same bits for any number of
+   threads, tile size and pass length. */
+PTDEF pt_result pt_render(const pt_scene *scene, const pt_render_desc *desc, pt_film *film, pt_report *report);
+/* Name of a sampler. */
+PTDEF const char *pt_sampler_name(pt_sampler_kind kind);
+/* Frees the rows; the report is as PT_REPORT_INIT made it. */
+PTDEF void pt_report_free(pt_report *report);
+#if PTI_HAS_STDIO && PTI_HAS_REPORT
+/* The table of error against run time as text. */
+PTDEF void pt_report_print(const pt_report *report, FILE *file);
+#endif
+#if PTI_HAS_FILES && PTI_HAS_REPORT
+/* The rows as CSV with a header line; true errors are empty without a reference. */
+PTDEF pt_result pt_report_write_csv(const pt_report *report, const char *path);
+/* Error against CPU seconds on log-log axes as an SVG picture: one line for each of `count` reports, and the
+   slope -1/2 of Monte Carlo. labels[i] may be NULL (the method's name). */
+PTDEF pt_result pt_report_write_svg(const pt_report *const *reports, const char *const *labels, int count,
+                                    const char *title, const char *path);
+#endif
+
+/* =====================================================================================================
+   [PT-19] CANONICAL SCENES: declarations
+   ===================================================================================================== */
+
+#if PTI_HAS_SCENES
+/* A scene with its camera. */
+typedef struct pt_scene_entry {
+    const char *name;
+    const char *summary;
+    pt_result (*make)(pt_scene *scene, pt_camera *camera); /* fills an empty scene and commits it          */
+} pt_scene_entry;
+
+/* All scenes; pt_scene_find by name, NULL if there is none. */
+PTDEF const pt_scene_entry *pt_scenes(int *count);
+PTDEF const pt_scene_entry *pt_scene_find(const char *name);
+
+/* The Cornell box from its measured data, in millimetres; lamp at y = 548.79, albedo 0.78. */
+PTDEF pt_result pt_scene_cornell(pt_scene *scene, pt_camera *camera);
+/* ... without its blocks; and with a mirror and a glass sphere instead of them. */
+PTDEF pt_result pt_scene_cornell_empty(pt_scene *scene, pt_camera *camera);
+PTDEF pt_result pt_scene_cornell_spheres(pt_scene *scene, pt_camera *camera);
+/* The closed box [-1/2,1/2]^3, emission 1 and albedo 1/2 on every wall: radiance 2 everywhere. */
+PTDEF pt_result pt_scene_furnace(pt_scene *scene, pt_camera *camera);
+/* Inside a diffuse sphere of radius 1, albedo 1/2, a point light of 1 W at (0.6, 0.2, -0.3): all indirect
+   radiance is rho^2 Phi / (4 pi^2 (1 - rho)). */
+PTDEF pt_result pt_scene_diffuse_sphere(pt_scene *scene, pt_camera *camera);
+/* A glass ball on a floor under a small bright lamp: a caustic that plain path tracing finds by luck. */
+PTDEF pt_result pt_scene_glass_ball(pt_scene *scene, pt_camera *camera);
+/* K. Beason's smallpt box: walls are spheres of radius 1e5. */
+PTDEF pt_result pt_scene_smallpt(pt_scene *scene, pt_camera *camera);
+
+/* Measured reflectance of the Cornell box walls and emission of its lamp, as tables; and the linear RGB that
+   pt_scene_cornell makes of them. name: "white", "red", "green" or "lamp". */
+PTDEF pt_spectrum pt_cornell_spectrum(const char *name);
+PTDEF pt_rgb pt_cornell_rgb(const char *name);
+#endif
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif /* PATHTRACER_H */
+
+/* ============================================================================================== */
+/* ===================================== IMPLEMENTATION ========================================= */
+/* ============================================================================================== */
+
+#if defined(PATHTRACER_IMPLEMENTATION) && !defined(PTI_IMPLEMENTED)
+#define PTI_IMPLEMENTED
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* =====================================================================================================
+   [PT-00] CONFIGURATION: implementation
+   =====================================================================================================
+   Everything that touches the operating system or the compiler stands here: memory, clocks, threads, and
+   the two macros on which the promises of [PT-06] rest. */
+
+#if defined(PT_MALLOC) && defined(PT_REALLOC) && defined(PT_FREE)
+#elif !defined(PT_MALLOC) && !defined(PT_REALLOC) && !defined(PT_FREE)
+#include <stdlib.h>
+#define PT_MALLOC(size, user) ((void)(user), malloc(size))
+#define PT_REALLOC(pointer, size, user) ((void)(user), realloc(pointer, size))
+#define PT_FREE(pointer, user) ((void)(user), free(pointer))
+#else
+#error "pathtracer.h: define all of PT_MALLOC, PT_REALLOC and PT_FREE, or none"
+#endif
+
+#ifndef PT_ASSERT
+#define PT_ASSERT(x) ((void)0)
+#endif
+
+#include <time.h>
+#if defined(_WIN32)
+#ifndef WIN32_LEAN_AND_MEAN
+#define WIN32_LEAN_AND_MEAN
+#endif
+#ifndef NOMINMAX
+#define NOMINMAX
+#endif
+#include <windows.h>
+#elif PTI_HAS_THREADS
+#include <pthread.h>
+#include <unistd.h>
+#endif
+
+/* A literal in the working precision; powers of two (C++11 has no hexadecimal ones). */
+#define PTI_R(x) ((pt_real)(x))
+#define PTI_2_M24 5.9604644775390625e-8
+#define PTI_2_M32 2.3283064365386962890625e-10
+#define PTI_2_M53 1.1102230246251565404e-16
+
+#if defined(__GNUC__)
+#define PTI_INLINE static inline __attribute__((always_inline, unused))
+#else
+#define PTI_INLINE static inline
+#endif
+
+/* PTI_FENCE(x) hands x through unchanged but hides from the compiler how it was made, so that a product
+   cannot be fused with a later addition: fma(a,b,-c*d) is not antisymmetric in (a,b) and (c,d), a*b - c*d is
+   ([PT-06] lives on that). */
+#if defined(__GNUC__) && (defined(__x86_64__) || defined(__SSE2_MATH__))
+#define PTI_FENCE(x) __asm__("" : "+x"(x))
+#elif defined(__GNUC__) && defined(__aarch64__)
+#define PTI_FENCE(x) __asm__("" : "+w"(x))
+#elif defined(__GNUC__)
+#define PTI_FENCE(x) __asm__("" : "+m"(x))
+#else
+#define PTI_FENCE(x) pti_fence(&(x))
+static void pti_fence(double *x)
+{
+    volatile double v = *x;
+    *x = v;
+}
+#endif
+
+PTDEF const char *pt_result_string(pt_result result)
+{
+    switch (result) {
+    case PT_OK: return "no error";
+    case PT_ERROR_ARGUMENT: return "an argument is outside its documented range";
+    case PT_ERROR_MEMORY: return "out of memory";
+    case PT_ERROR_SCENE: return "the scene is wrong (pt_scene_error names the item)";
+    case PT_ERROR_NOT_COMMITTED: return "the scene was not committed after its last change";
+    case PT_ERROR_LEFT_OUT: return "this needs a feature that a PT_NO_X switch left out";
+    case PT_ERROR_CANCELLED: return "cancelled by the callback";
+    case PT_ERROR_MISMATCH: return "the films do not belong together";
+    case PT_ERROR_FILE: return "the file could not be written";
+    }
+    return "unknown result";
+}
+
+/* count * size bytes, NULL if that overflows or there is no memory. Zero bytes ask for one, so that NULL
+   always means failure. */
+static void *pti_alloc(size_t count, size_t size, void *user)
+{
+    (void)user;
+    if (size != 0 && count > (SIZE_MAX - 1) / size) return NULL;
+    return PT_MALLOC(count * size + (count * size == 0), user);
+}
+
+static void *pti_alloc_zero(size_t count, size_t size, void *user)
+{
+    void *p = pti_alloc(count, size, user);
+    if (p) memset(p, 0, count * size);
+    return p;
+}
+
+static void pti_free(void *p, void *user)
+{
+    (void)user;
+    if (p) PT_FREE(p, user);
+}
+
+/* Makes room for `need` elements; grows by half. 0 = failed, the array is as it was. */
+static int pti_reserve(void **array, uint32_t *capacity, size_t need, size_t size, void *user)
+{
+    size_t wanted = (size_t)*capacity + *capacity / 2 + 8;
+    void *p;
+    (void)user;
+    if (need <= *capacity) return 1;
+    if (wanted < need) wanted = need;
+    if (wanted > 0x7fffffffu || wanted > SIZE_MAX / size) return 0;
+    p = PT_REALLOC(*array, wanted * size, user);
+    if (!p) return 0;
+    *array = p;
+    *capacity = (uint32_t)wanted;
+    return 1;
+}
+
+PTDEF double pt_wall_seconds(void)
+{
+#if defined(_WIN32)
+    LARGE_INTEGER count, frequency;
+    QueryPerformanceCounter(&count);
+    QueryPerformanceFrequency(&frequency);
+    return (double)count.QuadPart / (double)frequency.QuadPart;
+#elif defined(CLOCK_MONOTONIC)
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+#elif defined(TIME_UTC)
+    struct timespec t;
+    timespec_get(&t, TIME_UTC);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+#else
+    return (double)time(NULL);
+#endif
+}
+
+PTDEF double pt_wall_resolution(void)
+{
+#if defined(_WIN32) || defined(CLOCK_MONOTONIC) || defined(TIME_UTC)
+    return 1e-9;
+#else
+    return 1;
+#endif
+}
+
+PTDEF double pt_cpu_seconds(void)
+{
+#if defined(_WIN32)
+    FILETIME made, ended, kernel, user;
+    ULARGE_INTEGER k, u;
+    if (!GetProcessTimes(GetCurrentProcess(), &made, &ended, &kernel, &user)) return 0;
+    k.LowPart = kernel.dwLowDateTime;
+    k.HighPart = kernel.dwHighDateTime;
+    u.LowPart = user.dwLowDateTime;
+    u.HighPart = user.dwHighDateTime;
+    return 1e-7 * ((double)k.QuadPart + (double)u.QuadPart);
+#elif defined(CLOCK_PROCESS_CPUTIME_ID)
+    struct timespec t;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+#else
+    return (double)clock() / (double)CLOCKS_PER_SEC;
+#endif
+}
+
+PTDEF int pt_hardware_threads(void)
+{
+#if !PTI_HAS_THREADS
+    return 1;
+#elif defined(_WIN32)
+    SYSTEM_INFO info;
+    GetSystemInfo(&info);
+    return info.dwNumberOfProcessors < 1 ? 1 : (int)info.dwNumberOfProcessors;
+#else
+    long n = sysconf(_SC_NPROCESSORS_ONLN);
+    return n < 1 ? 1 : n > 1024 ? 1024 : (int)n;
+#endif
+}
+
+#if PTI_HAS_THREADS
+
+#if defined(_WIN32)
+typedef CRITICAL_SECTION pti_mutex;
+static int pti_mutex_make(pti_mutex *m) { InitializeCriticalSection(m); return 1; }
+static void pti_mutex_free(pti_mutex *m) { DeleteCriticalSection(m); }
+static void pti_lock(pti_mutex *m) { EnterCriticalSection(m); }
+static void pti_unlock(pti_mutex *m) { LeaveCriticalSection(m); }
+#else
+typedef pthread_mutex_t pti_mutex;
+static int pti_mutex_make(pti_mutex *m) { return pthread_mutex_init(m, NULL) == 0; }
+static void pti_mutex_free(pti_mutex *m) { pthread_mutex_destroy(m); }
+static void pti_lock(pti_mutex *m) { pthread_mutex_lock(m); }
+static void pti_unlock(pti_mutex *m) { pthread_mutex_unlock(m); }
+#endif
+
+/* A loop shared by several threads: each takes the next index under the lock. */
+typedef struct pti_loop {
+    pti_mutex lock;
+    int next, count;
+    void (*task)(void *context, int index);
+    void *context;
+} pti_loop;
+
+static void pti_loop_run(pti_loop *loop)
+{
+    for (;;) {
+        int i;
+        pti_lock(&loop->lock);
+        i = loop->next < loop->count ? loop->next++ : -1;
+        pti_unlock(&loop->lock);
+        if (i < 0) return;
+        loop->task(loop->context, i);
+    }
+}
+
+#if defined(_WIN32)
+static DWORD WINAPI pti_loop_thread(LPVOID loop)
+{
+    pti_loop_run((pti_loop *)loop);
+    return 0;
+}
+#else
+static void *pti_loop_thread(void *loop)
+{
+    pti_loop_run((pti_loop *)loop);
+    return NULL;
+}
+#endif
+
+#endif /* PTI_HAS_THREADS */
+
+#define PTI_MAX_THREADS 256
+
+/* task(context, i) for all i in 0..count-1 on up to `threads` threads, this one included. A thread that
+   cannot be started is done without. */
+static void pti_parallel(int threads, int count, void (*task)(void *, int), void *context)
+{
+    int i;
+#if PTI_HAS_THREADS
+    if (threads > count) threads = count;
+    if (threads > PTI_MAX_THREADS) threads = PTI_MAX_THREADS;
+    if (threads > 1) {
+        pti_loop loop;
+        int started = 0;
+#if defined(_WIN32)
+        HANDLE handles[PTI_MAX_THREADS];
+#else
+        pthread_t handles[PTI_MAX_THREADS];
+#endif
+        loop.next = 0;
+        loop.count = count;
+        loop.task = task;
+        loop.context = context;
+        if (pti_mutex_make(&loop.lock)) {
+            for (i = 1; i < threads; i++) {
+#if defined(_WIN32)
+                handles[started] = CreateThread(NULL, 0, pti_loop_thread, &loop, 0, NULL);
+                if (handles[started] == NULL) break;
+#else
+                if (pthread_create(&handles[started], NULL, pti_loop_thread, &loop) != 0) break;
+#endif
+                started++;
+            }
+            pti_loop_run(&loop);
+            for (i = 0; i < started; i++) {
+#if defined(_WIN32)
+                WaitForSingleObject(handles[i], INFINITE);
+                CloseHandle(handles[i]);
+#else
+                pthread_join(handles[i], NULL);
+#endif
+            }
+            pti_mutex_free(&loop.lock);
+            return;
+        }
+    }
+#endif
+    (void)threads;
+    for (i = 0; i < count; i++) task(context, i);
+}
+
+/* =====================================================================================================
+   [PT-01] VECTORS, FRAMES, COLOUR: implementation
+   ===================================================================================================== */
+
+/* The C library's functions in the working precision. */
+#ifdef PT_DOUBLE
+#define pti_sqrt sqrt
+#define pti_sin sin
+#define pti_cos cos
+#define pti_fabs fabs
+#define pti_copysign copysign
+#define pti_floor floor
+#define PTI_REAL_MAX 1.7976931348623157e308
+#define PTI_UNIT_ROUNDOFF PTI_2_M53
+#else
+#define pti_sqrt sqrtf
+#define pti_sin sinf
+#define pti_cos cosf
+#define pti_fabs fabsf
+#define pti_copysign copysignf
+#define pti_floor floorf
+#define PTI_REAL_MAX 3.40282346638528860e38f
+#define PTI_UNIT_ROUNDOFF PTI_2_M24
+#endif
+
+/* Three doubles: where a decision must not depend on the working precision. */
+typedef struct pti_d3 {
+    double x, y, z;
+} pti_d3;
+
+PTI_INLINE pti_d3 pti_d(double x, double y, double z)
+{
+    pti_d3 v;
+    v.x = x;
+    v.y = y;
+    v.z = z;
+    return v;
+}
+PTI_INLINE pti_d3 pti_d_from(pt_vec3 a) { return pti_d((double)a.x, (double)a.y, (double)a.z); }
+PTI_INLINE pt_vec3 pti_d_to(pti_d3 a) { return pt_v3((pt_real)a.x, (pt_real)a.y, (pt_real)a.z); }
+PTI_INLINE pti_d3 pti_d_add(pti_d3 a, pti_d3 b) { return pti_d(a.x + b.x, a.y + b.y, a.z + b.z); }
+PTI_INLINE pti_d3 pti_d_sub(pti_d3 a, pti_d3 b) { return pti_d(a.x - b.x, a.y - b.y, a.z - b.z); }
+PTI_INLINE pti_d3 pti_d_scale(pti_d3 a, double k) { return pti_d(a.x * k, a.y * k, a.z * k); }
+PTI_INLINE double pti_d_dot(pti_d3 a, pti_d3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+PTI_INLINE double pti_d_length(pti_d3 a) { return sqrt(pti_d_dot(a, a)); }
+PTI_INLINE pti_d3 pti_d_cross(pti_d3 a, pti_d3 b)
+{
+    return pti_d(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
+}
+PTI_INLINE pti_d3 pti_d_between(pt_vec3 from, pt_vec3 to)
+{
+    return pti_d_sub(pti_d_from(to), pti_d_from(from));
+}
+
+/* a / |a|. Squares outside [1e-270, 1e270] may have lost digits to under- or overflow: then scale first. */
+static pti_d3 pti_d_normalize(pti_d3 a)
+{
+    double l2 = pti_d_dot(a, a);
+    if (!(l2 > 1e-270 && l2 < 1e270)) {
+        double m = fmax(fabs(a.x), fmax(fabs(a.y), fabs(a.z)));
+        if (!(m > 0)) return a;
+        a = pti_d(a.x / m, a.y / m, a.z / m);
+        l2 = pti_d_dot(a, a);
+    }
+    return pti_d_scale(a, 1 / sqrt(l2));
+}
+
+PTDEF pt_real pt_v3_length(pt_vec3 a)
+{
+    return pti_sqrt(pt_v3_dot(a, a));
+}
+
+PTDEF pt_vec3 pt_v3_normalize(pt_vec3 a)
+{
+    return pti_d_to(pti_d_normalize(pti_d_from(a)));
+}
+
+PTDEF pt_frame pt_frame_from_normal(pt_vec3 n)
+{
+    /* [Duf17] listing 3. copysign keeps 1 + |n.z| away from zero for both signs of n.z, -0 included. */
+    pt_frame f;
+    pt_real sign = pti_copysign(PTI_R(1), n.z);
+    pt_real a = -1 / (sign + n.z);
+    pt_real b = n.x * n.y * a;
+    f.s = pt_v3(1 + sign * n.x * n.x * a, sign * b, -sign * n.x);
+    f.t = pt_v3(b, sign + n.y * n.y * a, -n.y);
+    f.n = n;
+    return f;
+}
+
+PTDEF double pt_luminance(double r, double g, double b)
+{
+    return 0.2126728514056225 * r + 0.7151521552878179 * g + 0.07217499330655958 * b;
+}
+
+PTDEF double pt_srgb_encode(double linear)
+{
+    return linear <= 0.0031308 ? 12.92 * linear : 1.055 * pow(linear, 1 / 2.4) - 0.055;
+}
+
+PTDEF unsigned char pt_srgb_byte(double linear)
+{
+    /* Written so that NaN takes the first way: a cast of NaN to an integer is undefined. */
+    double v = linear > 0 ? (linear < 1 ? linear : 1.0) : 0.0;
+    return (unsigned char)(255 * pt_srgb_encode(v) + 0.5);
+}
+
+static int pti_finite(double x)
+{
+    uint64_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    return (bits & 0x7ff0000000000000u) != 0x7ff0000000000000u;
+}
+static int pti_rgb_finite(pt_rgb c)
+{
+    return pti_finite((double)c.r) && pti_finite((double)c.g) && pti_finite((double)c.b);
+}
+PTI_INLINE int pti_rgb_black(pt_rgb c) { return !(c.r > 0 || c.g > 0 || c.b > 0); }
+
+/* =====================================================================================================
+   [PT-02] RANDOM NUMBERS AND SAMPLERS: implementation
+   =====================================================================================================
+   A Monte Carlo picture is a function of its random numbers. Here each number is a function of (seed,
+   stream, sample, dimension) and nothing else: no state is handed on from one sample to the next, so any
+   thread may take any sample, a render may stop and go on, and two estimators see the same numbers for the
+   same decision.
+
+   Independent numbers are a hash of that tuple. Sobol points are well spread: of 2^m points exactly one
+   lies in each of the 2^m boxes of many shapes, so a smooth integrand's error falls almost like 1/N
+   instead of 1/sqrt(N). Owen's scrambling randomises them without destroying that: it permutes the halves of
+   every dyadic interval at random, every point becomes uniform, and the estimate unbiased. More than four
+   dimensions are made by padding: sets of four, each with its points in an own random order [Bur20]. */
+
+PTDEF pt_pcg32 pt_pcg32_make(uint64_t seed, uint64_t stream)
+{
+    pt_pcg32 rng;
+    rng.state = 0;
+    rng.inc = (stream << 1) | 1;
+    pt_pcg32_next(&rng);
+    rng.state += seed;
+    pt_pcg32_next(&rng);
+    return rng;
+}
+
+PTDEF uint32_t pt_pcg32_next(pt_pcg32 *rng)
+{
+    uint64_t old = rng->state;
+    uint32_t xorshifted = (uint32_t)(((old >> 18) ^ old) >> 27);
+    uint32_t rot = (uint32_t)(old >> 59);
+    rng->state = old * 6364136223846793005u + rng->inc;
+    return (xorshifted >> rot) | (xorshifted << ((32u - rot) & 31u));
+}
+
+PTDEF void pt_pcg32_advance(pt_pcg32 *rng, uint64_t delta)
+{
+    /* k steps of x -> a x + c are one step x -> a' x + c'; (a', c') by repeated squaring. */
+    uint64_t mul = 6364136223846793005u, add = rng->inc, total_mul = 1, total_add = 0;
+    for (; delta; delta >>= 1) {
+        if (delta & 1) {
+            total_mul *= mul;
+            total_add = total_add * mul + add;
+        }
+        add = (mul + 1) * add;
+        mul *= mul;
+    }
+    rng->state = total_mul * rng->state + total_add;
+}
+
+PTDEF double pt_pcg32_double(pt_pcg32 *rng)
+{
+    uint64_t high = pt_pcg32_next(rng) >> 5, low = pt_pcg32_next(rng) >> 6; /* 27 and 26 bits */
+    return (double)((high << 26) | low) * PTI_2_M53;
+}
+
+PTDEF uint64_t pt_hash64(uint64_t x)
+{
+    /* [Ste11] variant 13; a zero input is moved away from its fixed point. */
+    x += 0x9e3779b97f4a7c15u;
+    x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
+    x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
+    return x ^ (x >> 31);
+}
+
+PTDEF pt_real pt_real_from_u32(uint32_t x)
+{
+#ifdef PT_DOUBLE
+    return (double)x * PTI_2_M32;
+#else
+    return (float)(x >> 8) * (float)PTI_2_M24; /* 24 bits: rounding all 32 would give 1 for the largest */
+#endif
+}
+
+/* A number in [0,1) cut (never rounded up to 1) to the working precision. */
+PTI_INLINE pt_real pti_cut(double u)
+{
+#ifdef PT_DOUBLE
+    return u;
+#else
+    return (float)(int32_t)(u * 16777216.0) * (float)PTI_2_M24;
+#endif
+}
+
+PTI_INLINE uint32_t pti_reverse_bits(uint32_t x)
+{
+    x = (x << 16) | (x >> 16);
+    x = ((x & 0x00ff00ffu) << 8) | ((x & 0xff00ff00u) >> 8);
+    x = ((x & 0x0f0f0f0fu) << 4) | ((x & 0xf0f0f0f0u) >> 4);
+    x = ((x & 0x33333333u) << 2) | ((x & 0xccccccccu) >> 2);
+    return ((x & 0x55555555u) << 1) | ((x & 0xaaaaaaaau) >> 1);
+}
+
+/* Sobol point n of dimension d with its bits reversed (the first binary digit is bit 0). Dimension 0 is the
+   van der Corput sequence, whose reversed bits are n itself. The matrix of dimension 1 is Pascal's triangle
+   modulo 2: a Kronecker power of ((1 1)(0 1)), hence five masked shifts. Dimensions 2 and 3 sum columns, made
+   from (s, a, m) = (2, 1, {1,3}) and (3, 1, {1,3,1}) by the recurrence of [Joe08]. */
+static uint32_t pti_sobol_reversed(uint32_t n, int d)
+{
+    static const uint32_t columns[2][32] = {
+        {0x00000001u, 0x00000003u, 0x00000006u, 0x00000009u, 0x00000017u, 0x0000003au, 0x00000071u, 0x000000a3u,
+         0x00000116u, 0x00000339u, 0x00000677u, 0x000009aau, 0x00001601u, 0x00003903u, 0x00007706u, 0x0000aa09u,
+         0x00010117u, 0x0003033au, 0x00060671u, 0x000909a3u, 0x00171616u, 0x003a3939u, 0x00717777u, 0x00a3aaaau,
+         0x01170001u, 0x033a0003u, 0x06710006u, 0x09a30009u, 0x16160017u, 0x3939003au, 0x77770071u, 0xaaaa00a3u},
+        {0x00000001u, 0x00000003u, 0x00000004u, 0x0000000au, 0x0000001fu, 0x0000002eu, 0x00000045u, 0x000000c9u,
+         0x0000011bu, 0x000002a4u, 0x0000079au, 0x00000b67u, 0x0000101eu, 0x0000302du, 0x00004041u, 0x0000a0c3u,
+         0x0001f104u, 0x0002e28au, 0x000457dfu, 0x000c9baeu, 0x0011a105u, 0x002a7289u, 0x0079e7dbu, 0x00b6dba4u,
+         0x0100011au, 0x030002a7u, 0x0400079eu, 0x0a000b6du, 0x1f001001u, 0x2e003003u, 0x45004004u, 0xc900a00au}
+    };
+    uint32_t x = 0;
+    int bit;
+    if (d == 0) return n;
+    if (d == 1) {
+        n ^= (n >> 1) & 0x55555555u;
+        n ^= (n >> 2) & 0x33333333u;
+        n ^= (n >> 4) & 0x0f0f0f0fu;
+        n ^= (n >> 8) & 0x00ff00ffu;
+        return n ^ ((n >> 16) & 0x0000ffffu);
+    }
+    for (bit = 0; n; bit++, n >>= 1) x ^= columns[d - 2][bit] & (0u - (n & 1u));
+    return x;
+}
+
+/* Hashes so that each bit depends on itself and the bits below it only: multiplications carry upwards.
+   Constants of [Veg21]. */
+PTI_INLINE uint32_t pti_laine_karras(uint32_t x, uint32_t seed)
+{
+    x ^= x * 0x3d20adeau;
+    x += seed;
+    x *= (seed >> 16) | 1u;
+    x ^= x * 0x05526c56u;
+    x ^= x * 0x53a22864u;
+    return x;
+}
+
+PTDEF uint32_t pt_sobol_u32(uint32_t n, int d)
+{
+    return pti_reverse_bits(pti_sobol_reversed(n, d & 3));
+}
+
+PTDEF uint32_t pt_owen_scramble(uint32_t x, uint32_t seed)
+{
+    return pti_reverse_bits(pti_laine_karras(pti_reverse_bits(x), seed));
+}
+
+PTDEF pt_sampler pt_sampler_make(pt_sampler_kind kind, uint64_t seed, uint32_t count)
+{
+    pt_sampler s;
+    memset(&s, 0, sizeof s);
+    s.kind = kind;
+    s.seed = seed;
+    s.count = count ? count : 1;
+    pt_sampler_start(&s, 0, 0);
+    return s;
+}
+
+PTDEF pt_sampler pt_sampler_make_given(const double *u, size_t count)
+{
+    pt_sampler s = pt_sampler_make(PT_SAMPLER_GIVEN, 0, 1);
+    s.given = u;
+    s.given_count = count;
+    return s;
+}
+
+PTDEF void pt_sampler_start(pt_sampler *s, uint64_t stream, uint32_t index)
+{
+    s->key = pt_hash64(pt_hash64(s->seed) ^ stream);
+    s->index = index;
+    s->dimension = 0;
+    s->set = 0;
+}
+
+PTDEF void pt_sampler_seek(pt_sampler *s, uint32_t dimension)
+{
+    s->dimension = dimension;
+}
+
+/* 64 random bits for a dimension of the stream; `use` keeps different uses apart. */
+PTI_INLINE uint64_t pti_sampler_hash(const pt_sampler *s, uint32_t dimension, uint32_t use)
+{
+    return pt_hash64(s->key ^ (((uint64_t)use << 32) | dimension));
+}
+
+static double pti_draw_independent(const pt_sampler *s, uint32_t dimension)
+{
+    return (double)(pti_sampler_hash(s, dimension, s->index ^ 0x80000000u) >> 11) * PTI_2_M53;
+}
+
+/* Two dimensions share one hash: its halves seed their scramblings. */
+static double pti_draw_sobol(pt_sampler *s, uint32_t dimension)
+{
+    uint64_t seeds = pti_sampler_hash(s, dimension >> 1, 1);
+    uint32_t seed = (uint32_t)((dimension & 1) ? seeds >> 32 : seeds);
+    if (s->set != (dimension >> 2) + 1) {
+        s->set = (dimension >> 2) + 1;
+        s->set_index = pt_owen_scramble(s->index, (uint32_t)pti_sampler_hash(s, s->set, 2));
+    }
+    return (double)pti_reverse_bits(pti_laine_karras(pti_sobol_reversed(s->set_index, dimension & 3), seed)) *
+           PTI_2_M32;
+}
+
+/* A random permutation of 0..n-1 at i: rounds of odd multiplication and xor-shift are a bijection on the
+   smallest power of two above; walking the cycle until the value is below n makes one of 0..n-1 [Ken13]. */
+static uint32_t pti_permute(uint32_t i, uint32_t n, uint64_t seed)
+{
+    uint32_t mask = n - 1, shift, round;
+    mask |= mask >> 1;
+    mask |= mask >> 2;
+    mask |= mask >> 4;
+    mask |= mask >> 8;
+    mask |= mask >> 16;
+    for (shift = 1; (mask >> (2 * shift)) != 0; shift++) {}
+    do {
+        for (round = 0; round < 4; round++) {
+            uint64_t key = pt_hash64(seed + round);
+            i = (i * ((uint32_t)key | 1u) + (uint32_t)(key >> 32)) & mask;
+            i ^= i >> shift;
+        }
+    } while (i >= n);
+    return i;
+}
+
+/* Stratum `index` of `cells` in a random order; a new order each time all are used up. */
+static uint32_t pti_stratum(const pt_sampler *s, uint32_t dimension, uint32_t cells)
+{
+    return pti_permute(s->index % cells, cells, pti_sampler_hash(s, dimension, 3 + s->index / cells));
+}
+
+static double pti_draw_stratified(const pt_sampler *s, uint32_t dimension)
+{
+    return ((double)pti_stratum(s, dimension, s->count) + pti_draw_independent(s, dimension)) / (double)s->count;
+}
+
+static double pti_draw_given(pt_sampler *s, uint32_t dimension)
+{
+    if (dimension < s->given_count) return s->given[dimension];
+    s->given_missing++;
+    return pti_draw_independent(s, dimension);
+}
+
+/* The next number in double. */
+static double pti_draw(pt_sampler *s)
+{
+    uint32_t dimension = s->dimension++;
+    switch (s->kind) {
+    case PT_SAMPLER_SOBOL: return pti_draw_sobol(s, dimension);
+    case PT_SAMPLER_STRATIFIED: return pti_draw_stratified(s, dimension);
+    case PT_SAMPLER_GIVEN: return pti_draw_given(s, dimension);
+    case PT_SAMPLER_INDEPENDENT: break;
+    }
+    return pti_draw_independent(s, dimension);
+}
+
+PTDEF pt_real pt_sampler_1d(pt_sampler *s)
+{
+    return pti_cut(pti_draw(s));
+}
+
+/* A jittered grid of nx x ny >= count cells. If some cells stay empty, which ones is random: each sample is
+   uniform all the same. */
+static pt_vec2 pti_pair_stratified(pt_sampler *s)
+{
+    uint32_t d = s->dimension, nx = (uint32_t)sqrt((double)s->count), ny, cell;
+    double jx = pti_draw_independent(s, d), jy = pti_draw_independent(s, d + 1);
+    if (nx < 1) nx = 1;
+    ny = s->count / nx + (s->count % nx != 0);
+    cell = pti_stratum(s, d, nx * ny);
+    s->dimension = d + 2;
+    return pt_v2(pti_cut(((double)(cell % nx) + jx) / (double)nx), pti_cut(((double)(cell / nx) + jy) / (double)ny));
+}
+
+PTDEF pt_vec2 pt_sampler_2d(pt_sampler *s)
+{
+    pt_vec2 u;
+    if (s->kind == PT_SAMPLER_STRATIFIED) return pti_pair_stratified(s);
+    u.x = pt_sampler_1d(s);
+    u.y = pt_sampler_1d(s);
+    return u;
+}
+
+/* =====================================================================================================
+   [PT-03] STATISTICS AND ESTIMATES: implementation
+   =====================================================================================================
+   The estimator of an integral I = int f(x) dx is the mean of f(X)/p(X) over points X of density p: its
+   expectation is I for every p that is positive wherever f is not zero. Its standard error is sigma/sqrt(N),
+   and sigma is estimated from the same values. So every number comes with its own error bar, and a test can
+   say how improbable a deviation is. */
+
+PTDEF void pt_stats_add(pt_stats *s, double x)
+{
+    double delta = x - s->mean, n = s->n + 1, step = delta / n, term = delta * step * s->n;
+    s->mean += step;
+    s->m3 += term * step * (n - 2) - 3 * step * s->m2;
+    s->m2 += term;
+    s->n = n;
+}
+
+PTDEF void pt_stats_merge(pt_stats *a, const pt_stats *b)
+{
+    double n = a->n + b->n, delta = b->mean - a->mean;
+    if (b->n == 0) return;
+    if (a->n == 0) {
+        *a = *b;
+        return;
+    }
+    a->m3 += b->m3 + delta * delta * delta * a->n * b->n * (a->n - b->n) / (n * n) +
+             3 * delta * (a->n * b->m2 - b->n * a->m2) / n;
+    a->m2 += b->m2 + delta * delta * a->n * b->n / n;
+    a->mean += delta * b->n / n;
+    a->n = n;
+}
+
+PTDEF double pt_stats_variance(const pt_stats *s)
+{
+    return s->n > 1 ? s->m2 / (s->n - 1) : 0;
+}
+
+PTDEF double pt_stats_standard_error(const pt_stats *s)
+{
+    return s->n > 1 ? sqrt(pt_stats_variance(s) / s->n) : 0;
+}
+
+PTDEF double pt_stats_skewness(const pt_stats *s)
+{
+    return s->m2 > 0 ? sqrt(s->n) * s->m3 / (s->m2 * sqrt(s->m2)) : 0;
+}
+
+PTDEF double pt_normal_sf(double x)
+{
+    return 0.5 * erfc(x * 0.70710678118654752440);
+}
+
+PTDEF double pt_normal_isf(double p)
+{
+    double lo = -40, hi = 40; /* the tail beyond 40 is below the smallest double */
+    int i;
+    for (i = 0; i < 100; i++) {
+        double mid = 0.5 * (lo + hi);
+        if (pt_normal_sf(mid) > p) lo = mid;
+        else hi = mid;
+    }
+    return 0.5 * (lo + hi);
+}
+
+/* One step of Lentz' evaluation of a continued fraction b0 + a1/(b1 + a2/(b2 + ...)). */
+static double pti_lentz(double *f, double *c, double *d, double a, double b)
+{
+    double tiny = 1e-300, step;
+    *d = b + a * *d;
+    if (fabs(*d) < tiny) *d = tiny;
+    *c = b + a / *c;
+    if (fabs(*c) < tiny) *c = tiny;
+    *d = 1 / *d;
+    step = *c * *d;
+    *f *= step;
+    return step;
+}
+
+/* Regularised incomplete beta function I_x(a,b) by its continued fraction [DLMF 8.17.22], which converges
+   fast for x < (a+1)/(a+b+2). */
+static double pti_beta_fraction(double x, double a, double b)
+{
+    double f = 1, c = 1, d = 0;
+    double front = exp(lgamma(a + b) - lgamma(a) - lgamma(b) + a * log(x) + b * log1p(-x)) / a;
+    int i;
+    for (i = 1; i < 10000; i++) {
+        double m = i / 2, step;
+        if (i & 1) step = -(a + m) * (a + b + m) * x / ((a + 2 * m) * (a + 2 * m + 1));
+        else step = m * (b - m) * x / ((a + 2 * m - 1) * (a + 2 * m));
+        if (fabs(pti_lentz(&f, &c, &d, step, 1) - 1) < 1e-16) break;
+    }
+    return front / f;
+}
+
+PTDEF double pt_student_sf(double x, double df)
+{
+    /* P(T > x) = I_z(df/2, 1/2) / 2 with z = df / (df + x^2), for x >= 0. */
+    double y = x * x / df, z = 1 / (1 + y), tail;
+    if (x < 0) return 1 - pt_student_sf(-x, df);
+    if (y == 0) return 0.5;
+    if (z < (df / 2 + 1) / (df / 2 + 2.5)) tail = pti_beta_fraction(z, df / 2, 0.5);
+    else tail = 1 - pti_beta_fraction(y / (1 + y), 0.5, df / 2);
+    return 0.5 * tail;
+}
+
+PTDEF double pt_chi2_sf(double x, double df)
+{
+    /* Q(a, y) with a = df/2, y = x/2: series of P for y < a + 1 [DLMF 8.11.4], else the continued fraction
+       of Q [DLMF 8.9.2]. */
+    double a = df / 2, y = x / 2, front, sum = 0, term, f, c, d;
+    int i;
+    if (!(x > 0)) return 1;
+    front = exp(a * log(y) - y - lgamma(a));
+    if (y < a + 1) {
+        term = 1 / a;
+        for (i = 1; i < 100000 && term > 1e-17 * sum; i++) {
+            sum += term;
+            term *= y / (a + i);
+        }
+        return 1 - front * sum;
+    }
+    f = c = y + 1 - a; /* >= 2 - rounding here */
+    d = 0;
+    for (i = 1; i < 100000; i++)
+        if (fabs(pti_lentz(&f, &c, &d, -i * (i - a), y + 2 * i + 1 - a) - 1) < 1e-16) break;
+    return front / f;
+}
+
+PTDEF pt_result pt_estimate_mean(pt_integrand f, void *user, int dimensions, uint32_t n, pt_sampler_kind kind,
+                                 uint64_t seed, pt_estimate *out)
+{
+    /* Independent numbers: every value is a unit of the statistics. Else: every randomised point set is. */
+    uint32_t sets = kind == PT_SAMPLER_INDEPENDENT ? n : 32, points, set, i;
+    pt_stats stats = PT_STATS_INIT;
+    double start = pt_cpu_seconds(), u[64];
+    pt_sampler sampler;
+    int d;
+    memset(out, 0, sizeof *out);
+    if (!f || dimensions < 1 || dimensions > 64 || n < 32 || kind == PT_SAMPLER_GIVEN) return PT_ERROR_ARGUMENT;
+    points = n / sets;
+    sampler = pt_sampler_make(kind, seed, points);
+    for (set = 0; set < sets; set++) {
+        double sum = 0;
+        for (i = 0; i < points; i++) {
+            pt_sampler_start(&sampler, set, i);
+            for (d = 0; d < dimensions; d++) u[d] = pti_draw(&sampler);
+            sum += f(u, user);
+        }
+        pt_stats_add(&stats, sum / points);
+    }
+    out->value = stats.mean;
+    out->standard_error = pt_stats_standard_error(&stats);
+    out->evaluations = (double)sets * points;
+    out->seconds = pt_cpu_seconds() - start;
+    return PT_OK;
+}
+
+/* =====================================================================================================
+   [PT-04] SAMPLING WARPS: implementation
+   =====================================================================================================
+   A warp takes uniform numbers to points of a wanted density p: if x = g(u), then p(x) = 1 / |det g'(u)|.
+   Each stands beside its density, and nobody else writes that density down. Small angles are the trap: the
+   cosine of a cone of half angle 1e-4 has lost half its digits, so nothing here is computed as 1 - cos. */
+
+/* Shirley and Chiu's map of the square a, b in [-1,1] to polar coordinates of the disk: concentric squares
+   become concentric circles [Shi97]. */
+static pt_vec2 pti_concentric(pt_real a, pt_real b, pt_real *radius)
+{
+    pt_real r, phi;
+    if (a == 0 && b == 0) {
+        *radius = 0;
+        return pt_v2(0, 0);
+    }
+    if (pti_fabs(a) > pti_fabs(b)) {
+        r = a;
+        phi = PTI_R(PT_PI / 4) * (b / a);
+    } else {
+        r = b;
+        phi = PTI_R(PT_PI / 2) - PTI_R(PT_PI / 4) * (a / b);
+    }
+    *radius = pti_fabs(r);
+    return pt_v2(r * pti_cos(phi), r * pti_sin(phi));
+}
+
+PTDEF pt_vec2 pt_warp_disk(pt_vec2 u)
+{
+    pt_real r;
+    return pti_concentric(2 * u.x - 1, 2 * u.y - 1, &r);
+}
+
+PTDEF pt_vec3 pt_warp_hemisphere(pt_vec2 u)
+{
+    pt_real r = pti_sqrt((1 - u.x) * (1 + u.x)), phi = PTI_R(2 * PT_PI) * u.y;
+    return pt_v3(r * pti_cos(phi), r * pti_sin(phi), u.x);
+}
+
+PTDEF pt_real pt_warp_hemisphere_pdf_w(pt_vec3 w)
+{
+    return w.z >= 0 ? PTI_R(1 / (2 * PT_PI)) : 0;
+}
+
+PTDEF pt_vec3 pt_warp_cosine(pt_vec2 u)
+{
+    /* u stands for the cell [u, u + 2 h) of the generator's grid; its centre u + h keeps a and b inside
+       (-1, 1), so that r < 1 and z > 0: a direction with z = 0 would have density 0. */
+    const pt_real h = PTI_R(PTI_UNIT_ROUNDOFF);
+    pt_real r;
+    pt_vec2 d = pti_concentric(2 * u.x - 1 + h, 2 * u.y - 1 + h, &r);
+    return pt_v3(d.x, d.y, pti_sqrt((1 - r) * (1 + r)));
+}
+
+PTDEF pt_real pt_warp_cosine_pdf_w(pt_vec3 w)
+{
+    return w.z > 0 ? w.z * PTI_R(1 / PT_PI) : 0;
+}
+
+PTDEF pt_vec3 pt_warp_sphere(pt_vec2 u)
+{
+    pt_real r = 2 * pti_sqrt(u.x * (1 - u.x)), phi = PTI_R(2 * PT_PI) * u.y;
+    return pt_v3(r * pti_cos(phi), r * pti_sin(phi), 1 - 2 * u.x);
+}
+
+PTDEF pt_real pt_warp_sphere_pdf_w(void)
+{
+    return PTI_R(1 / (4 * PT_PI));
+}
+
+PTDEF pt_vec3 pt_warp_cone(pt_vec2 u, double omc)
+{
+    /* x = 1 - cos is uniform on [0, omc]; sin^2 = x (2 - x). */
+    double x = (double)u.x * omc, r = sqrt(x * (2 - x)), phi = 2 * PT_PI * (double)u.y;
+    return pt_v3((pt_real)(r * cos(phi)), (pt_real)(r * sin(phi)), (pt_real)(1 - x));
+}
+
+PTDEF double pt_warp_cone_pdf_w(double omc)
+{
+    return 1 / (2 * PT_PI * omc);
+}
+
+PTDEF pt_vec2 pt_warp_triangle(pt_vec2 u)
+{
+    pt_real s = pti_sqrt(u.x);
+    return pt_v2(s * (1 - u.y), s * u.y);
+}
+
+/* --- spherical triangle ---
+
+   Let a, b, c be the unit directions to the corners. [Oos83]: the solid angle E satisfies
+       tan(E/2) = |a . (b x c)| / (1 + a.b + b.c + c.a).
+   Put c(s) = cos(s) a + sin(s) t on the arc from a to c (t its unit tangent at a). Divide above and below by
+   1 + cos(s), with h = s/2:
+       tan(E/2) = V sin(h) / ((1 + a.b) cos(h) + (b.t) sin(h)),      V = |a . (b x t)|.
+   This gives the solid angle of the whole (s = arc), and solved for h it is the sampling of [Arv95]: the part
+   of the triangle up to c(s) has solid angle u E where
+       tan(h) = (1 + a.b) sin(u E/2) / (V cos(u E/2) - (b.t) sin(u E/2)).
+   No term is a difference of nearly equal numbers if V and b.t are formed from b - a; so the relative error
+   stays small for triangles of any size, where Arvo's sum of angles minus pi loses everything. */
+
+static double pti_spherical_triangle_setup(pt_spherical_triangle *s, pti_d3 v0, pti_d3 v1, pti_d3 v2)
+{
+    pti_d3 a = pti_d_normalize(v0), b = pti_d_normalize(v1), c = pti_d_normalize(v2);
+    pti_d3 ab = pti_d_sub(b, a), ac = pti_d_sub(c, a), t;
+    double e, h;
+    t = pti_d_sub(ac, pti_d_scale(a, pti_d_dot(a, ac)));
+    t = pti_d_normalize(t);
+    s->arc = 2 * asin(fmin(1, pti_d_length(ac) / 2));
+    s->triple = fabs(pti_d_dot(ab, pti_d_cross(t, a)));
+    s->bt = pti_d_dot(ab, t);
+    s->ab1 = 1 + pti_d_dot(a, b);
+    s->a[0] = a.x; s->a[1] = a.y; s->a[2] = a.z;
+    s->b[0] = b.x; s->b[1] = b.y; s->b[2] = b.z;
+    s->t[0] = t.x; s->t[1] = t.y; s->t[2] = t.z;
+    h = s->arc / 2;
+    e = 2 * atan2(s->triple * sin(h), s->ab1 * cos(h) + s->bt * sin(h));
+    s->solid_angle = s->triple > 0 && e > 0 ? e : 0;
+    return s->solid_angle;
+}
+
+PTDEF double pt_spherical_triangle_make(pt_spherical_triangle *s, pt_vec3 p, pt_vec3 v0, pt_vec3 v1, pt_vec3 v2)
+{
+    return pti_spherical_triangle_setup(s, pti_d_between(p, v0), pti_d_between(p, v1), pti_d_between(p, v2));
+}
+
+static pti_d3 pti_spherical_triangle_direction(const pt_spherical_triangle *s, double u0, double u1)
+{
+    pti_d3 a = pti_d(s->a[0], s->a[1], s->a[2]), b = pti_d(s->b[0], s->b[1], s->b[2]);
+    pti_d3 t = pti_d(s->t[0], s->t[1], s->t[2]), c, bc;
+    double half = 0.5 * u0 * s->solid_angle, arc, x;
+    arc = 2 * atan2(s->ab1 * sin(half), s->triple * cos(half) - s->bt * sin(half));
+    c = pti_d_add(pti_d_scale(a, cos(arc)), pti_d_scale(t, sin(arc)));
+    /* On the arc from b to c, 1 - cos is uniform; at c it is |c - b|^2 / 2. */
+    bc = pti_d_sub(c, b);
+    x = 0.5 * u1 * pti_d_dot(bc, bc);
+    bc = pti_d_normalize(pti_d_sub(bc, pti_d_scale(b, pti_d_dot(b, bc))));
+    return pti_d_add(pti_d_scale(b, 1 - x), pti_d_scale(bc, sqrt(fmax(0, x * (2 - x)))));
+}
+
+PTDEF pt_vec3 pt_spherical_triangle_sample(const pt_spherical_triangle *s, pt_vec2 u)
+{
+    return pti_d_to(pti_spherical_triangle_direction(s, (double)u.x, (double)u.y));
+}
+
+/* --- spherical rectangle [Ure13] ---
+
+   In the frame of the rectangle (x, y along the edges, z towards p, so that the plane is z = z0 < 0) the part
+   up to abscissa x has a solid angle that can be inverted in closed form; along the remaining line the
+   ordinate follows from the sine of its elevation. The angles enter as a sum minus 2 pi, with an error of a
+   few 2^-53 * 2 pi: relative to a solid angle below 3e-8 sr that is more than float's 2^-24. Below, the
+   rectangle is sampled as two spherical triangles, which have no such loss. */
+
+#define PTI_RECTANGLE_TINY 3e-8
+
+PTDEF double pt_spherical_rectangle_make(pt_spherical_rectangle *s, pt_vec3 p, pt_vec3 corner, pt_vec3 e1,
+                                         pt_vec3 e2)
+{
+    pti_d3 d = pti_d_between(p, corner), d1 = pti_d_from(e1), d2 = pti_d_from(e2), far = pti_d_add(pti_d_add(d, d1), d2);
+    pti_d3 x = pti_d_normalize(d1), y = pti_d_normalize(d2), z = pti_d_cross(x, y);
+    pt_spherical_triangle half;
+    double n0, n2, n3;
+    s->z0 = pti_d_dot(d, z);
+    if (s->z0 > 0) {
+        s->z0 = -s->z0;
+        z = pti_d_scale(z, -1);
+    }
+    s->x[0] = x.x; s->x[1] = x.y; s->x[2] = x.z;
+    s->y[0] = y.x; s->y[1] = y.y; s->y[2] = y.z;
+    s->z[0] = z.x; s->z[1] = z.y; s->z[2] = z.z;
+    s->x0 = pti_d_dot(d, x);
+    s->y0 = pti_d_dot(d, y);
+    s->x1 = s->x0 + pti_d_length(d1);
+    s->y1 = s->y0 + pti_d_length(d2);
+    /* z components of the unit normals of the four planes through p and an edge */
+    n0 = -s->y0 / hypot(s->y0, s->z0);
+    n2 = s->y1 / hypot(s->y1, s->z0);
+    n3 = -s->x0 / hypot(s->x0, s->z0);
+    s->b0 = n0;
+    s->b1 = n2;
+    s->k = 2 * PT_PI - acos(fmax(-1, fmin(1, -n2 * n3))) - acos(fmax(-1, fmin(1, -n3 * n0)));
+    s->solid_angle = pti_spherical_triangle_setup(&half, d, pti_d_add(d, d1), far);
+    s->solid_angle += pti_spherical_triangle_setup(&half, d, far, pti_d_add(d, d2));
+    if (!(s->z0 < 0)) s->solid_angle = 0;
+    return s->solid_angle;
+}
+
+static pti_d3 pti_spherical_rectangle_tiny(const pt_spherical_rectangle *s, double u0, double u1)
+{
+    pti_d3 v00 = pti_d(s->x0, s->y0, s->z0), v10 = pti_d(s->x1, s->y0, s->z0);
+    pti_d3 v11 = pti_d(s->x1, s->y1, s->z0), v01 = pti_d(s->x0, s->y1, s->z0);
+    pt_spherical_triangle half;
+    double first = pti_spherical_triangle_setup(&half, v00, v10, v11) / s->solid_angle;
+    if (u0 < first) return pti_spherical_triangle_direction(&half, u0 / first, u1);
+    pti_spherical_triangle_setup(&half, v00, v11, v01);
+    return pti_spherical_triangle_direction(&half, (u0 - first) / (1 - first), u1);
+}
+
+static pti_d3 pti_spherical_rectangle_local(const pt_spherical_rectangle *s, double u0, double u1)
+{
+    double au = u0 * s->solid_angle + s->k, fu = (cos(au) * s->b0 - s->b1) / sin(au);
+    double cu = copysign(1 / sqrt(fu * fu + s->b0 * s->b0), fu), xu, d, h0, h1, h, yv;
+    cu = fmax(-1, fmin(1, cu));
+    xu = -cu * s->z0 / sqrt((1 - cu) * (1 + cu));
+    xu = fmax(s->x0, fmin(s->x1, xu));
+    d = hypot(xu, s->z0);
+    h0 = s->y0 / hypot(d, s->y0);
+    h1 = s->y1 / hypot(d, s->y1);
+    h = h0 + u1 * (h1 - h0);
+    yv = h * d / sqrt((1 - h) * (1 + h));
+    yv = fmax(s->y0, fmin(s->y1, yv));
+    return pti_d(xu, yv, s->z0);
+}
+
+static pti_d3 pti_spherical_rectangle_direction(const pt_spherical_rectangle *s, double u0, double u1)
+{
+    pti_d3 x = pti_d(s->x[0], s->x[1], s->x[2]), y = pti_d(s->y[0], s->y[1], s->y[2]);
+    pti_d3 z = pti_d(s->z[0], s->z[1], s->z[2]), l;
+    if (s->solid_angle < PTI_RECTANGLE_TINY) l = pti_spherical_rectangle_tiny(s, u0, u1);
+    else l = pti_spherical_rectangle_local(s, u0, u1);
+    l = pti_d_add(pti_d_add(pti_d_scale(x, l.x), pti_d_scale(y, l.y)), pti_d_scale(z, l.z));
+    return pti_d_normalize(l);
+}
+
+PTDEF pt_vec3 pt_spherical_rectangle_sample(const pt_spherical_rectangle *s, pt_vec2 u)
+{
+    return pti_d_to(pti_spherical_rectangle_direction(s, (double)u.x, (double)u.y));
+}
+
+/* --- discrete distributions --- */
+
+/* [Vos91]: columns of equal height 1/n; each holds one index and, above its threshold, an alias that fills it
+   up. `stack` holds the indices that are still too small from the left, those too large from the right. */
+static void pti_alias_fill(pt_alias *table, double *scaled, uint32_t *stack)
+{
+    uint32_t n = table->count, i, small = 0, large = n;
+    for (i = 0; i < n; i++) {
+        scaled[i] = table->entries[i].pmf * n;
+        if (scaled[i] < 1) stack[small++] = i;
+        else stack[--large] = i;
+    }
+    while (small > 0 && large < n) {
+        uint32_t s = stack[--small], l = stack[large];
+        table->entries[s].threshold = scaled[s];
+        table->entries[s].alias = l;
+        scaled[l] -= 1 - scaled[s];
+        if (scaled[l] < 1) {
+            large++;
+            stack[small++] = l;
+        }
+    }
+    /* What is left is full up to rounding. */
+    while (large < n) table->entries[stack[large++]].threshold = 1;
+    while (small > 0) table->entries[stack[--small]].threshold = 1;
+}
+
+PTDEF pt_result pt_alias_make(pt_alias *table, const double *weights, uint32_t count, void *alloc_user)
+{
+    double sum = 0, *scaled;
+    uint32_t i, *stack;
+    table->entries = NULL;
+    table->count = 0;
+    for (i = 0; i < count; i++) {
+        if (!(weights[i] >= 0) || !pti_finite(weights[i])) return PT_ERROR_ARGUMENT;
+        sum += weights[i];
+    }
+    if (!pti_finite(sum)) return PT_ERROR_ARGUMENT;
+    if (!(sum > 0)) return PT_OK;
+    table->entries = (pt_alias_entry *)pti_alloc_zero(count, sizeof *table->entries, alloc_user);
+    scaled = (double *)pti_alloc(count, sizeof *scaled, alloc_user);
+    stack = (uint32_t *)pti_alloc(count, sizeof *stack, alloc_user);
+    if (table->entries && scaled && stack) {
+        table->count = count;
+        for (i = 0; i < count; i++) {
+            table->entries[i].pmf = weights[i] / sum;
+            table->entries[i].alias = i;
+        }
+        pti_alias_fill(table, scaled, stack);
+    } else {
+        pti_free(table->entries, alloc_user);
+        table->entries = NULL;
+    }
+    pti_free(scaled, alloc_user);
+    pti_free(stack, alloc_user);
+    return table->entries ? PT_OK : PT_ERROR_MEMORY;
+}
+
+PTDEF uint32_t pt_alias_sample(const pt_alias *table, double u, double *pmf)
+{
+    double scaled = u * table->count;
+    uint32_t i = (uint32_t)scaled;
+    if (i >= table->count) i = table->count - 1; /* u * n may round up to n */
+    if (scaled - i >= table->entries[i].threshold) i = table->entries[i].alias;
+    *pmf = table->entries[i].pmf;
+    return i;
+}
+
+PTDEF void pt_alias_free(pt_alias *table, void *alloc_user)
+{
+    pti_free(table->entries, alloc_user);
+    table->entries = NULL;
+    table->count = 0;
+}
+
+/* =====================================================================================================
+   [PT-05] RADIOMETRY: implementation
+   =====================================================================================================
+   Flux is energy per time (W); intensity I = dPhi/domega (W/sr) is what a point source sends into a
+   direction; irradiance E = dPhi/dA (W/m^2) is what falls on a surface; radiance L = d^2Phi/(domega dA cos)
+   is what a ray carries, the same at both its ends. E = int L cos domega over the hemisphere; the closed forms
+   below are that integral for simple lights, and the tests hold the samplers against them. */
+
+PTDEF double pt_solid_angle_cap(double theta)
+{
+    double s = sin(theta / 2);
+    return 4 * PT_PI * s * s; /* 2 pi (1 - cos theta) without the cancellation */
+}
+
+PTDEF double pt_solid_angle_triangle(pt_vec3 p, pt_vec3 v0, pt_vec3 v1, pt_vec3 v2)
+{
+    pt_spherical_triangle s;
+    return pt_spherical_triangle_make(&s, p, v0, v1, v2);
+}
+
+PTDEF double pt_irradiance_point(double intensity, double d, double cos_theta)
+{
+    return intensity * fmax(0, cos_theta) / (d * d);
+}
+
+PTDEF double pt_irradiance_sphere(double radiance, double r, double d, double cos_theta)
+{
+    return PT_PI * radiance * (r / d) * (r / d) * cos_theta;
+}
+
+PTDEF double pt_irradiance_disk(double radiance, double r, double h)
+{
+    return PT_PI * radiance * r * r / (r * r + h * h);
+}
+
+/* The part of a polygon with n . v > 0 (v relative to the receiver); out has room for count + 1 corners. */
+static int pti_clip_horizon(const pti_d3 *v, int count, pti_d3 n, pti_d3 *out)
+{
+    int i, kept = 0;
+    for (i = 0; i < count; i++) {
+        pti_d3 a = v[i], b = v[(i + 1) % count];
+        double ha = pti_d_dot(a, n), hb = pti_d_dot(b, n);
+        if (ha > 0) out[kept++] = a;
+        if ((ha > 0) != (hb > 0)) out[kept++] = pti_d_add(a, pti_d_scale(pti_d_sub(b, a), ha / (ha - hb)));
+    }
+    return kept;
+}
+
+PTDEF double pt_irradiance_polygon(double radiance, pt_vec3 p, pt_vec3 n, const pt_vec3 *v, int count)
+{
+    /* [Lam60]: E = L/2 sum over edges of (angle of the edge) * (unit normal of its plane through p) . n */
+    pti_d3 in[32], out[66], nd = pti_d_from(n);
+    double sum = 0;
+    int i, kept;
+    if (count < 3 || count > 32) return 0;
+    for (i = 0; i < count; i++) in[i] = pti_d_between(p, v[i]);
+    kept = pti_clip_horizon(in, count, nd, out);
+    for (i = 0; i < kept; i++) {
+        pti_d3 a = pti_d_normalize(out[i]), b = pti_d_normalize(out[(i + 1) % kept]), axis = pti_d_cross(a, b);
+        double s = pti_d_length(axis);
+        if (s > 0) sum += atan2(s, pti_d_dot(a, b)) * pti_d_dot(axis, nd) / s;
+    }
+    return 0.5 * radiance * fabs(sum);
+}
+
+PTDEF double pt_spectrum_at(const pt_spectrum *s, double nm)
+{
+    int i, last = s->count - 1;
+    if (nm < s->nm[0] || nm > s->nm[last])
+        return s->zero_outside ? 0 : nm < s->nm[0] ? s->value[0] : s->value[last];
+    for (i = 0; i < last - 1 && nm > s->nm[i + 1];) i++;
+    if (last == 0) return s->value[0];
+    return s->value[i] + (s->value[i + 1] - s->value[i]) * (nm - s->nm[i]) / (s->nm[i + 1] - s->nm[i]);
+}
+
+/* CIE 1931 2-degree standard observer and illuminant D65, 360 to 830 nm in steps of 5 nm
+   [ISO/CIE 11664-1 and 11664-2]: xbar, ybar, zbar, S. */
+#define PTI_CIE_COUNT 95
+static const double pti_cie[PTI_CIE_COUNT][4] = {
+    {0.0001299, 3.917e-06, 0.0006061, 46.6383}, {0.0002321, 6.965e-06, 0.001086, 49.3637},
+    {0.0004149, 1.239e-05, 0.001946, 52.0891}, {0.0007416, 2.202e-05, 0.003486, 51.0323},
+    {0.001368, 3.9e-05, 0.006450001, 49.9755}, {0.002236, 6.4e-05, 0.01054999, 52.3118},
+    {0.004243, 0.00012, 0.02005001, 54.6482}, {0.00765, 0.000217, 0.03621, 68.7015},
+    {0.01431, 0.000396, 0.06785001, 82.7549}, {0.02319, 0.00064, 0.1102, 87.1204},
+    {0.04351, 0.00121, 0.2074, 91.486}, {0.07763, 0.00218, 0.3713, 92.4589},
+    {0.13438, 0.004, 0.6456, 93.4318}, {0.21477, 0.0073, 1.0390501, 90.057},
+    {0.2839, 0.0116, 1.3856, 86.6823}, {0.3285, 0.01684, 1.62296, 95.7736},
+    {0.34828, 0.023, 1.74706, 104.865}, {0.34806, 0.0298, 1.7826, 110.936},
+    {0.3362, 0.038, 1.77211, 117.008}, {0.3187, 0.048, 1.7441, 117.41},
+    {0.2908, 0.06, 1.6692, 117.812}, {0.2511, 0.0739, 1.5281, 116.336},
+    {0.19536, 0.09098, 1.28764, 114.861}, {0.1421, 0.1126, 1.0419, 115.392},
+    {0.09564, 0.13902, 0.8129501, 115.923}, {0.05795001, 0.1693, 0.6162, 112.367},
+    {0.03201, 0.20802, 0.46518, 108.811}, {0.0147, 0.2586, 0.3533, 109.082},
+    {0.0049, 0.323, 0.272, 109.354}, {0.0024, 0.4073, 0.2123, 108.578},
+    {0.0093, 0.503, 0.1582, 107.802}, {0.0291, 0.6082, 0.1117, 106.296},
+    {0.06327, 0.71, 0.07824999, 104.79}, {0.1096, 0.7932, 0.05725001, 106.239},
+    {0.1655, 0.862, 0.04216, 107.689}, {0.2257499, 0.9148501, 0.02984, 106.047},
+    {0.2904, 0.954, 0.0203, 104.405}, {0.3597, 0.9803, 0.0134, 104.225},
+    {0.4334499, 0.9949501, 0.008749999, 104.046}, {0.5120501, 1, 0.005749999, 102.023},
+    {0.5945, 0.995, 0.0039, 100}, {0.6784, 0.9786, 0.002749999, 98.1671},
+    {0.7621, 0.952, 0.0021, 96.3342}, {0.8425, 0.9154, 0.0018, 96.0611},
+    {0.9163, 0.87, 0.001650001, 95.788}, {0.9786, 0.8163, 0.0014, 92.2368},
+    {1.0263, 0.757, 0.0011, 88.6856}, {1.0567, 0.6949, 0.001, 89.3459},
+    {1.0622, 0.631, 0.0008, 90.0062}, {1.0456, 0.5668, 0.0006, 89.8026},
+    {1.0026, 0.503, 0.00034, 89.5991}, {0.9384, 0.4412, 0.00024, 88.6489},
+    {0.8544499, 0.381, 0.00019, 87.6987}, {0.7514, 0.321, 0.0001, 85.4936},
+    {0.6424, 0.265, 4.999999e-05, 83.2886}, {0.5419, 0.217, 3e-05, 83.4939},
+    {0.4479, 0.175, 2e-05, 83.6992}, {0.3608, 0.1382, 1e-05, 81.863},
+    {0.2835, 0.107, 0, 80.0268}, {0.2187, 0.0816, 0, 80.1207},
+    {0.1649, 0.061, 0, 80.2146}, {0.1212, 0.04458, 0, 81.2462},
+    {0.0874, 0.032, 0, 82.2778}, {0.0636, 0.0232, 0, 80.281},
+    {0.04677, 0.017, 0, 78.2842}, {0.0329, 0.01192, 0, 74.0027},
+    {0.0227, 0.00821, 0, 69.7213}, {0.01584, 0.005723, 0, 70.6652},
+    {0.01135916, 0.004102, 0, 71.6091}, {0.008110916, 0.002929, 0, 72.979},
+    {0.005790346, 0.002091, 0, 74.349}, {0.004109457, 0.001484, 0, 67.9765},
+    {0.002899327, 0.001047, 0, 61.604}, {0.00204919, 0.00074, 0, 65.7448},
+    {0.001439971, 0.00052, 0, 69.8856}, {0.0009999493, 0.0003611, 0, 72.4863},
+    {0.0006900786, 0.0002492, 0, 75.087}, {0.0004760213, 0.0001719, 0, 69.3398},
+    {0.0003323011, 0.00012, 0, 63.5927}, {0.0002348261, 8.48e-05, 0, 55.0054},
+    {0.0001661505, 6e-05, 0, 46.4182}, {0.000117413, 4.24e-05, 0, 56.6118},
+    {8.307527e-05, 3e-05, 0, 66.8054}, {5.870652e-05, 2.12e-05, 0, 65.0941},
+    {4.150994e-05, 1.499e-05, 0, 63.3828}, {2.935326e-05, 1.06e-05, 0, 63.8434},
+    {2.067383e-05, 7.4657e-06, 0, 64.304}, {1.455977e-05, 5.2578e-06, 0, 61.8779},
+    {1.025398e-05, 3.7029e-06, 0, 59.4519}, {7.221456e-06, 2.6078e-06, 0, 55.7054},
+    {5.085868e-06, 1.8366e-06, 0, 51.959}, {3.581652e-06, 1.2934e-06, 0, 54.6998},
+    {2.522525e-06, 9.1093e-07, 0, 57.4406}, {1.776509e-06, 6.4153e-07, 0, 58.8765},
+    {1.251141e-06, 4.5181e-07, 0, 60.3125}
+};
+
+PTDEF void pt_cie_xyz(double nm, double xyz[3])
+{
+    /* The cubic through the four nearest entries: close to the 1 nm tables of the standard (1e-5). */
+    double x = (nm - 360) / 5, f, w[4];
+    int i, k;
+    xyz[0] = xyz[1] = xyz[2] = 0;
+    if (!(nm >= 360 && nm <= 830)) return;
+    i = (int)x;
+    if (i < 1) i = 1;
+    if (i > PTI_CIE_COUNT - 3) i = PTI_CIE_COUNT - 3;
+    f = x - i;
+    w[0] = -f * (f - 1) * (f - 2) / 6;
+    w[1] = (f + 1) * (f - 1) * (f - 2) / 2;
+    w[2] = -(f + 1) * f * (f - 2) / 2;
+    w[3] = (f + 1) * f * (f - 1) / 6;
+    for (k = 0; k < 12; k++) xyz[k % 3] += w[k / 3] * pti_cie[i - 1 + k / 3][k % 3];
+}
+
+PTDEF double pt_cie_d65(double nm)
+{
+    double x = (nm - 360) / 5;
+    int i;
+    if (!(nm >= 360 && nm <= 830)) return 0;
+    i = x < PTI_CIE_COUNT - 2 ? (int)x : PTI_CIE_COUNT - 2;
+    return pti_cie[i][3] + (x - i) * (pti_cie[i + 1][3] - pti_cie[i][3]); /* linear by definition */
+}
+
+PTDEF pt_rgbd pt_xyz_to_rgb(const double xyz[3])
+{
+    /* inverse of the matrix whose columns are the sRGB primaries, scaled to D65 white */
+    return pt_rgbd3(3.240454162114105 * xyz[0] - 1.537138512797717 * xyz[1] - 0.4985314095560162 * xyz[2],
+                    -0.9692660305051868 * xyz[0] + 1.876010845446694 * xyz[1] + 0.0415560175303498 * xyz[2],
+                    0.0556434309591147 * xyz[0] - 0.2040259135167538 * xyz[1] + 1.057225188223179 * xyz[2]);
+}
+
+/* XYZ of a spectrum, under D65 (light = 1) or as it is (light = 0), divided by what the constant 1 has in Y. */
+static pt_rgbd pti_spectrum_to_rgb(const pt_spectrum *s, int light)
+{
+    double xyz[3] = {0, 0, 0}, white = 0, bar[3], power;
+    int nm, k;
+    for (nm = 360; nm <= 830; nm++) {
+        pt_cie_xyz(nm, bar);
+        power = light ? pt_cie_d65(nm) : 1;
+        white += power * bar[1];
+        power *= pt_spectrum_at(s, nm);
+        for (k = 0; k < 3; k++) xyz[k] += power * bar[k];
+    }
+    for (k = 0; k < 3; k++) xyz[k] /= white;
+    return pt_xyz_to_rgb(xyz);
+}
+
+PTDEF pt_rgbd pt_reflectance_to_rgb(const pt_spectrum *reflectance)
+{
+    return pti_spectrum_to_rgb(reflectance, 1);
+}
+
+PTDEF pt_rgbd pt_emission_to_rgb(const pt_spectrum *emission)
+{
+    return pti_spectrum_to_rgb(emission, 0);
+}
+
+/* =====================================================================================================
+   [PT-06] SHAPES AND RAYS: implementation
+   =====================================================================================================
+   Two questions decide whether a picture has cracks and speckles: does this ray meet this shape, and where
+   does the next ray start? Both are answered without any length that somebody has chosen.
+
+   Decisions are made in double from the pt_real input. A sphere's discriminant is formed from the distance of
+   its centre to the ray, (r - l)(r + l), not as b^2 - 4ac, which cancels for far and for huge spheres [Hai19].
+   A triangle is tested by the signs of three edge functions after a shear that makes the ray the z axis
+   [Woo13]; here those signs are EXACT for the sheared corners: a*b - c*d of doubles has the sign of the
+   difference of the two rounded products, because rounding is monotonic, and where these are equal the signs
+   of their rounding errors decide (fma gives them exactly). Two triangles that share an edge see the same
+   sheared corners, so a ray falls on one side of the edge for both or on the edge for both: no gap.
+
+   A computed point is off its surface by rounding; its error bound travels with it in pt_hit. The next ray
+   starts at the point moved along the normal by that bound, each coordinate rounded away from the surface
+   ([PBR] 6.8): the least offset that is safe, at any scale. */
+
+PTDEF double pt_gamma(int n)
+{
+    return n * PTI_UNIT_ROUNDOFF / (1 - n * PTI_UNIT_ROUNDOFF);
+}
+
+/* A ray made ready for the shapes and boxes. */
+typedef struct pti_ray {
+    double o[3], d[3];
+    int kx, ky, kz;         /* the axes, z the longest of d                                                */
+    double sx, sy, sz;      /* shear and scale that take d to (0,0,1)                                      */
+    pt_real origin[3], inverse[3]; /* for boxes; 1/0 = infinity                                            */
+} pti_ray;
+
+static pti_ray pti_ray_make(const pt_ray *ray)
+{
+    pti_ray r;
+    int k;
+    r.origin[0] = ray->o.x; r.origin[1] = ray->o.y; r.origin[2] = ray->o.z;
+    r.inverse[0] = 1 / ray->d.x; r.inverse[1] = 1 / ray->d.y; r.inverse[2] = 1 / ray->d.z;
+    r.o[0] = (double)ray->o.x; r.o[1] = (double)ray->o.y; r.o[2] = (double)ray->o.z;
+    r.d[0] = (double)ray->d.x; r.d[1] = (double)ray->d.y; r.d[2] = (double)ray->d.z;
+    r.kz = fabs(r.d[0]) > fabs(r.d[1]) ? 0 : 1;
+    if (fabs(r.d[2]) > fabs(r.d[r.kz])) r.kz = 2;
+    r.kx = r.kz == 2 ? 0 : r.kz + 1;
+    r.ky = r.kx == 2 ? 0 : r.kx + 1;
+    if (r.d[r.kz] < 0) { /* keeps the winding of triangles */
+        k = r.kx;
+        r.kx = r.ky;
+        r.ky = k;
+    }
+    r.sz = 1 / r.d[r.kz];
+    r.sx = r.d[r.kx] / r.d[r.kz];
+    r.sy = r.d[r.ky] / r.d[r.kz];
+    return r;
+}
+
+/* a * b - c * d with the exact sign; swapping the two products negates the result exactly. */
+PTI_INLINE double pti_edge(double a, double b, double c, double d)
+{
+    double p = a * b, q = c * d;
+    PTI_FENCE(p);
+    PTI_FENCE(q);
+    if (p == q) return fma(a, b, -p) - fma(c, d, -q);
+    return p - q;
+}
+
+/* A corner relative to the origin, sheared: (x, y) across the ray, z along it in units of d. */
+PTI_INLINE pti_d3 pti_shear(const pti_ray *r, pt_vec3 v)
+{
+    double c[3], px, py;
+    c[0] = (double)v.x - r->o[0];
+    c[1] = (double)v.y - r->o[1];
+    c[2] = (double)v.z - r->o[2];
+    px = r->sx * c[r->kz];
+    py = r->sy * c[r->kz];
+    PTI_FENCE(px);
+    PTI_FENCE(py);
+    return pti_d(c[r->kx] - px, c[r->ky] - py, r->sz * c[r->kz]);
+}
+
+/* Bound of the rounding error of the depth u a.z + v b.z + w c.z before it is divided by det ([PBR] 6.8.7): an
+   origin on the plane of the triangle may come out in front of it by no more than this. Relative errors, in
+   units of e = 2^-53: z 3 (difference, reciprocal, product), x and y 5 of their own and the sheared-off part,
+   an edge function 2 and what x and y bring in, the sum 3. */
+PTI_INLINE double pti_depth_error(const pti_ray *r, pti_d3 a, pti_d3 b, pti_d3 c, double u, double v, double w)
+{
+    const double e = PTI_2_M53 * (1 + 16 * PTI_2_M53);
+    double x = fmax(fabs(a.x), fmax(fabs(b.x), fabs(c.x))), y = fmax(fabs(a.y), fmax(fabs(b.y), fabs(c.y)));
+    double z = fmax(fabs(a.z), fmax(fabs(b.z), fabs(c.z))), sheared = z / fabs(r->sz);
+    double dx = 5 * e * (x + sheared), dy = 5 * e * (y + sheared), dz = 3 * e * z;
+    double edge = fmax(fabs(u), fmax(fabs(v), fabs(w))), dedge = 2 * (2 * e * x * y + dy * x + dx * y);
+    return 3 * (3 * e * edge * z + dedge * z + dz * edge);
+}
+
+/* t in (0, tmax) and weights of corners b and c. */
+PTI_INLINE int pti_triangle(const pti_ray *r, pt_vec3 v0, pt_vec3 v1, pt_vec3 v2, double tmax, double *t,
+                            double *b1, double *b2)
+{
+    pti_d3 a = pti_shear(r, v0), b = pti_shear(r, v1), c = pti_shear(r, v2);
+    double u = pti_edge(c.x, b.y, c.y, b.x), v = pti_edge(a.x, c.y, a.y, c.x), w, det, depth, p, q;
+    if ((u < 0 && v > 0) || (u > 0 && v < 0)) return 0;
+    w = pti_edge(b.x, a.y, b.y, a.x);
+    if ((u < 0 || v < 0 || w < 0) && (u > 0 || v > 0 || w > 0)) return 0;
+    det = u + v + w;
+    if (det == 0) return 0; /* seen edge-on */
+    p = u * a.z;
+    q = v * b.z;
+    depth = w * c.z;
+    PTI_FENCE(p);
+    PTI_FENCE(q);
+    PTI_FENCE(depth);
+    depth += p + q;
+    if (!(depth / det > 0 && depth / det < tmax)) return 0; /* NaN misses */
+    if (!(fabs(depth) > pti_depth_error(r, a, b, c, u, v, w))) return 0; /* the origin may lie on it */
+    *t = depth / det;
+    *b1 = v / det;
+    *b2 = w / det;
+    return 1;
+}
+
+/* The corners in order, rounded to pt_real as a user's own sums would be: then a neighbour with the same
+   corners leaves no gap. */
+PTI_INLINE void pti_parallelogram_corners(const pt_parallelogram *s, pt_vec3 v[4])
+{
+    v[0] = s->corner;
+    v[1] = pt_v3_add(s->corner, s->edge1);
+    v[2] = pt_v3_add(v[1], s->edge2);
+    v[3] = pt_v3_add(s->corner, s->edge2);
+}
+
+/* A parallelogram is two triangles that share the diagonal from the corner; u and v are the weights of its
+   edges, u >= v in the first triangle. */
+PTI_INLINE int pti_parallelogram(const pti_ray *r, const pt_parallelogram *s, double tmax, double *t, double *u,
+                                 double *v)
+{
+    pt_vec3 c[4];
+    double b1, b2;
+    pti_parallelogram_corners(s, c);
+    if (pti_triangle(r, c[0], c[1], c[2], tmax, t, &b1, &b2)) {
+        *u = b1 + b2;
+        *v = b2;
+        return 1;
+    }
+    if (pti_triangle(r, c[0], c[2], c[3], tmax, t, &b1, &b2)) {
+        *u = b1;
+        *v = b1 + b2;
+        return 1;
+    }
+    return 0;
+}
+
+/* [Hai19]: with f = o - c and b = -f.d, the foot of the perpendicular is l = f + (b/a) d, and the
+   discriminant is a (r - |l|)(r + |l|). The root that would cancel comes from the product of both,
+   (|f| - r)(|f| + r). */
+PTI_INLINE int pti_sphere(const pti_ray *r, pt_vec3 centre, double radius, double tmax, double *t)
+{
+    pti_d3 d = pti_d(r->d[0], r->d[1], r->d[2]);
+    pti_d3 f = pti_d_sub(pti_d(r->o[0], r->o[1], r->o[2]), pti_d_from(centre));
+    double a = pti_d_dot(d, d), b = -pti_d_dot(f, d), l, root, q, c, near, far;
+    l = pti_d_length(pti_d_add(f, pti_d_scale(d, b / a)));
+    if (!(l <= radius)) return 0;
+    root = sqrt(a * (radius - l) * (radius + l));
+    q = b + copysign(root, b);
+    c = pti_d_length(f);
+    c = (c - radius) * (c + radius);
+    if (q == 0) return 0; /* both roots are 0: a tangent at the origin */
+    near = c / q;
+    far = q / a;
+    if (near > far) {
+        double swap = near;
+        near = far;
+        far = swap;
+    }
+    if (!(near > 0)) near = far;
+    if (!(near > 0 && near < tmax)) return 0;
+    *t = near;
+    return 1;
+}
+
+PTDEF int pt_intersect_sphere(const pt_ray *ray, pt_vec3 centre, pt_real radius, double *t)
+{
+    pti_ray r = pti_ray_make(ray);
+    return radius > 0 && pti_sphere(&r, centre, (double)radius, (double)ray->tmax, t);
+}
+
+/* Is the normal (v1-v0)x(v2-v0) different from zero in double? */
+static int pti_triangle_has_area(pt_vec3 v0, pt_vec3 v1, pt_vec3 v2)
+{
+    pti_d3 n = pti_d_cross(pti_d_between(v0, v1), pti_d_between(v0, v2));
+    return pti_d_length(pti_d_normalize(n)) > 0.5;
+}
+
+PTDEF int pt_intersect_triangle(const pt_ray *ray, pt_vec3 v0, pt_vec3 v1, pt_vec3 v2, double *t, double b[2])
+{
+    pti_ray r = pti_ray_make(ray);
+    return pti_triangle_has_area(v0, v1, v2) && pti_triangle(&r, v0, v1, v2, (double)ray->tmax, t, &b[0], &b[1]);
+}
+
+/* Slabs [Ize13]. Near and far face are chosen by the sign of 1/d; the comparisons keep the old value where
+   0 * infinity gave NaN (origin on a face, ray inside its plane), which is the conservative answer. A far
+   distance is the product of three rounded operations; widening it by 1 + 2 gamma(3) outweighs the errors of
+   both distances. *entry: where the box begins. */
+PTI_INLINE int pti_box(const pti_ray *r, pt_vec3 lo, pt_vec3 hi, pt_real tmax, pt_real *entry)
+{
+    const pt_real pad = PTI_R(1 + 2 * 3 * PTI_UNIT_ROUNDOFF / (1 - 3 * PTI_UNIT_ROUNDOFF) + PTI_UNIT_ROUNDOFF);
+    pt_real near = 0, far = tmax, n, f;
+    n = ((r->inverse[0] < 0 ? hi.x : lo.x) - r->origin[0]) * r->inverse[0];
+    f = ((r->inverse[0] < 0 ? lo.x : hi.x) - r->origin[0]) * r->inverse[0] * pad;
+    if (n > near) near = n;
+    if (f < far) far = f;
+    n = ((r->inverse[1] < 0 ? hi.y : lo.y) - r->origin[1]) * r->inverse[1];
+    f = ((r->inverse[1] < 0 ? lo.y : hi.y) - r->origin[1]) * r->inverse[1] * pad;
+    if (n > near) near = n;
+    if (f < far) far = f;
+    n = ((r->inverse[2] < 0 ? hi.z : lo.z) - r->origin[2]) * r->inverse[2];
+    f = ((r->inverse[2] < 0 ? lo.z : hi.z) - r->origin[2]) * r->inverse[2] * pad;
+    if (n > near) near = n;
+    if (f < far) far = f;
+    *entry = near;
+    return near <= far;
+}
+
+PTDEF int pt_intersect_box(const pt_ray *ray, pt_vec3 lo, pt_vec3 hi)
+{
+    pti_ray r = pti_ray_make(ray);
+    pt_real entry;
+    return lo.x <= hi.x && lo.y <= hi.y && lo.z <= hi.z && pti_box(&r, lo, hi, ray->tmax, &entry);
+}
+
+/* The next representable number upwards, or downwards. */
+static pt_real pti_next(pt_real x, int up)
+{
+#ifdef PT_DOUBLE
+    uint64_t bits, sign = (uint64_t)1 << 63;
+#else
+    uint32_t bits, sign = 0x80000000u;
+#endif
+    if (x == 0) x = 0; /* -0 becomes +0 */
+    memcpy(&bits, &x, sizeof bits);
+    if (bits == 0) bits = up ? 1u : sign | 1u;
+    else if (((bits & sign) == 0) == (up != 0)) bits++;
+    else bits--;
+    memcpy(&x, &bits, sizeof bits);
+    return x;
+}
+
+static pt_real pti_round_away(pt_real p, pt_real offset)
+{
+    pt_real moved = p + offset;
+    return offset > 0 ? pti_next(moved, 1) : offset < 0 ? pti_next(moved, 0) : moved;
+}
+
+/* p moved off its surface to the side of n (unit) for w.n >= 0, else to the other: by d = sum |n_k| err_k,
+   the largest distance from the true plane that the error allows ([PBR] 6.8.6). */
+static pt_vec3 pti_offset(pt_vec3 p, pt_vec3 error, pt_vec3 n, pt_vec3 w)
+{
+    pt_real d = pti_fabs(n.x) * error.x + pti_fabs(n.y) * error.y + pti_fabs(n.z) * error.z;
+    if (pt_v3_dot(n, w) < 0) d = -d;
+    return pt_v3(pti_round_away(p.x, d * n.x), pti_round_away(p.y, d * n.y), pti_round_away(p.z, d * n.z));
+}
+
+PTDEF pt_ray pt_spawn_ray(pt_vec3 p, pt_vec3 p_error, pt_vec3 ng, pt_vec3 w)
+{
+    pt_ray ray;
+    ray.o = pti_offset(p, p_error, ng, w);
+    ray.d = w;
+    ray.tmax = PTI_REAL_MAX;
+    return ray;
+}
+
+PTDEF pt_ray pt_spawn_ray_to(pt_vec3 p, pt_vec3 p_error, pt_vec3 np, pt_vec3 q, pt_vec3 q_error, pt_vec3 nq)
+{
+    /* The direction q - o is rounded once per coordinate, which moves the end by up to u |d_k|: that belongs
+       to the error of q. */
+    const pt_real u = PTI_R(PTI_UNIT_ROUNDOFF);
+    pt_vec3 d = pt_v3_sub(q, p);
+    pt_ray ray;
+    ray.o = pti_offset(p, p_error, np, d);
+    q_error = pt_v3_add(q_error, pt_v3(u * pti_fabs(d.x), u * pti_fabs(d.y), u * pti_fabs(d.z)));
+    ray.d = pt_v3_sub(pti_offset(q, q_error, nq, pt_v3_neg(d)), ray.o);
+    ray.tmax = 1;
+    return ray;
+}
+
+/* The nearest hit so far. */
+typedef struct pti_best {
+    double t, u, v;
+    int primitive;
+} pti_best;
+
+/* Tests primitive i of the scene for t in (0, best->t]; equal distances go to the lower number, so that the
+   answer does not depend on the order of the tests. */
+PTI_INLINE int pti_test(const pt_scene *scene, const pti_ray *r, int i, pti_best *best)
+{
+    const pt_primitive *p = &scene->primitives[i];
+    double t, u = 0, v = 0, tmax = best->primitive > i ? best->t * (1 + 2 * PTI_2_M53) : best->t;
+    int hit;
+    if (p->shape == PT_SHAPE_TRIANGLE) {
+        const pt_triangle *s = &scene->triangles[p->index];
+        hit = pti_triangle(r, scene->positions[s->v[0]], scene->positions[s->v[1]], scene->positions[s->v[2]], tmax,
+                           &t, &u, &v);
+    } else if (p->shape == PT_SHAPE_PARALLELOGRAM) {
+        hit = pti_parallelogram(r, &scene->parallelograms[p->index], tmax, &t, &u, &v);
+    } else {
+        const pt_sphere *s = &scene->spheres[p->index];
+        hit = pti_sphere(r, s->centre, (double)s->radius, tmax, &t);
+    }
+    if (!hit || t > best->t) return 0;
+    best->t = t;
+    best->u = u;
+    best->v = v;
+    best->primitive = i;
+    return 1;
+}
+
+/* Error of a point computed in double from terms of magnitude m and then rounded to pt_real. Sixteen
+   roundings of 2^-53 cover the shear, the edge functions, the division and the weighted sum. */
+PTI_INLINE pt_real pti_point_error(pt_real p, double m)
+{
+    return PTI_R(PTI_UNIT_ROUNDOFF) * pti_fabs(p) + (pt_real)(16 * PTI_2_M53 * m);
+}
+
+static void pti_set_point(pt_hit *hit, pti_d3 p, pti_d3 magnitude)
+{
+    hit->p = pti_d_to(p);
+    hit->p_error = pt_v3(pti_point_error(hit->p.x, magnitude.x), pti_point_error(hit->p.y, magnitude.y),
+                         pti_point_error(hit->p.z, magnitude.z));
+}
+
+static pti_d3 pti_d_abs(pti_d3 a)
+{
+    return pti_d(fabs(a.x), fabs(a.y), fabs(a.z));
+}
+
+/* Position, error bound and normal of a triangle at weights b1, b2 of its corners 1 and 2. */
+static void pti_fill_corners(pt_hit *hit, pt_vec3 v0, pt_vec3 v1, pt_vec3 v2, double b1, double b2)
+{
+    pti_d3 a = pti_d_from(v0), b = pti_d_from(v1), c = pti_d_from(v2), p;
+    p = pti_d_add(pti_d_scale(a, 1 - b1 - b2), pti_d_add(pti_d_scale(b, b1), pti_d_scale(c, b2)));
+    pti_set_point(hit, p, pti_d_add(pti_d_abs(a), pti_d_add(pti_d_abs(b), pti_d_abs(c))));
+    hit->ng = pti_d_to(pti_d_normalize(pti_d_cross(pti_d_sub(b, a), pti_d_sub(c, a))));
+    hit->ns = hit->ng;
+}
+
+/* The same on the triangle of a parallelogram in which the weights u, v of its edges lie. */
+static void pti_fill_parallelogram(pt_hit *hit, const pt_parallelogram *s, double u, double v)
+{
+    pt_vec3 c[4];
+    pti_parallelogram_corners(s, c);
+    if (u >= v) pti_fill_corners(hit, c[0], c[1], c[2], u - v, v);
+    else pti_fill_corners(hit, c[0], c[2], c[3], u, v - u);
+}
+
+/* Shading normal and texture coordinates, where the mesh has them. */
+static void pti_fill_mesh(const pt_scene *scene, const pt_triangle *s, pt_hit *hit)
+{
+    const pt_mesh *mesh = &scene->meshes[s->mesh];
+    pt_real w = 1 - hit->u - hit->v;
+    if (mesh->has_normals) {
+        const pt_vec3 *n = scene->normals;
+        pt_vec3 sum = pt_v3_scale(n[s->v[0] + mesh->normal_offset], w);
+        sum = pt_v3_add(sum, pt_v3_scale(n[s->v[1] + mesh->normal_offset], hit->u));
+        sum = pt_v3_normalize(pt_v3_add(sum, pt_v3_scale(n[s->v[2] + mesh->normal_offset], hit->v)));
+        if (pt_v3_dot(sum, hit->ng) < 0) sum = pt_v3_neg(sum);
+        if (pt_v3_dot(sum, sum) > PTI_R(0.5)) hit->ns = sum; /* normals that cancel leave the geometric one */
+    }
+    if (mesh->has_uvs) {
+        const pt_vec2 *t = scene->uvs;
+        pt_vec2 a = t[s->v[0] + mesh->uv_offset], b = t[s->v[1] + mesh->uv_offset], c = t[s->v[2] + mesh->uv_offset];
+        hit->uv = pt_v2(w * a.x + hit->u * b.x + hit->v * c.x, w * a.y + hit->u * b.y + hit->v * c.y);
+    }
+}
+
+static void pti_fill_sphere(const pt_sphere *s, const pti_ray *r, double t, pt_hit *hit)
+{
+    pti_d3 c = pti_d_from(s->centre), n, radius = pti_d((double)s->radius, (double)s->radius, (double)s->radius);
+    n = pti_d(r->o[0] + t * r->d[0], r->o[1] + t * r->d[1], r->o[2] + t * r->d[2]);
+    n = pti_d_normalize(pti_d_sub(n, c));
+    /* Projected back onto the sphere, so that the error of t does not matter. */
+    pti_set_point(hit, pti_d_add(c, pti_d_scale(n, (double)s->radius)), pti_d_add(pti_d_abs(c), radius));
+    hit->ng = hit->ns = pti_d_to(n);
+}
+
+/* Everything about the hit. */
+static void pti_fill(const pt_scene *scene, const pti_ray *r, const pti_best *best, pt_hit *hit)
+{
+    const pt_primitive *p = &scene->primitives[best->primitive];
+    hit->t = (pt_real)best->t;
+    hit->u = (pt_real)best->u;
+    hit->v = (pt_real)best->v;
+    hit->uv = pt_v2(hit->u, hit->v);
+    hit->primitive = best->primitive;
+    hit->shape = p->shape;
+    hit->light = p->light;
+    if (p->shape == PT_SHAPE_TRIANGLE) {
+        const pt_triangle *s = &scene->triangles[p->index];
+        hit->material = s->material;
+        pti_fill_corners(hit, scene->positions[s->v[0]], scene->positions[s->v[1]], scene->positions[s->v[2]],
+                         best->u, best->v);
+        pti_fill_mesh(scene, s, hit);
+    } else if (p->shape == PT_SHAPE_PARALLELOGRAM) {
+        const pt_parallelogram *s = &scene->parallelograms[p->index];
+        hit->material = s->material;
+        pti_fill_parallelogram(hit, s, best->u, best->v);
+    } else {
+        hit->material = scene->spheres[p->index].material;
+        pti_fill_sphere(&scene->spheres[p->index], r, best->t, hit);
+    }
+}
+
+/* =====================================================================================================
+   [PT-07] BOUNDING VOLUME HIERARCHY: implementation
+   =====================================================================================================
+   A tree of boxes: a ray that misses a box misses all in it. Where to split? The chance that a random ray
+   which meets a box also meets a box inside is the ratio of their areas, so the expected cost of a split is
+   C = 1 + (A_left n_left + A_right n_right) / A (surface area heuristic). Sixteen bins an axis are tried. Where
+   no split helps or all centres coincide, the list is halved; below depth 32 it always is, so no tree is deeper
+   than 32 + log2(n) <= 63, and a fixed stack is enough. */
+
+/* A box of doubles that grows; areas of large boxes do not fit into float. */
+typedef struct pti_bounds {
+    double lo[3], hi[3];
+} pti_bounds;
+
+static pti_bounds pti_bounds_empty(void)
+{
+    pti_bounds b;
+    int k;
+    for (k = 0; k < 3; k++) {
+        b.lo[k] = HUGE_VAL;
+        b.hi[k] = -HUGE_VAL;
+    }
+    return b;
+}
+
+static void pti_bounds_add(pti_bounds *b, pt_vec3 lo, pt_vec3 hi)
+{
+    double l[3], h[3];
+    int k;
+    l[0] = (double)lo.x; l[1] = (double)lo.y; l[2] = (double)lo.z;
+    h[0] = (double)hi.x; h[1] = (double)hi.y; h[2] = (double)hi.z;
+    for (k = 0; k < 3; k++) {
+        if (l[k] < b->lo[k]) b->lo[k] = l[k];
+        if (h[k] > b->hi[k]) b->hi[k] = h[k];
+    }
+}
+
+static void pti_bounds_join(pti_bounds *b, const pti_bounds *other)
+{
+    int k;
+    for (k = 0; k < 3; k++) {
+        if (other->lo[k] < b->lo[k]) b->lo[k] = other->lo[k];
+        if (other->hi[k] > b->hi[k]) b->hi[k] = other->hi[k];
+    }
+}
+
+#if PTI_HAS_BVH
+
+#define PTI_BINS 16
+#define PTI_LEAF_MAX 8
+
+static double pti_bounds_half_area(const pti_bounds *b)
+{
+    double x = b->hi[0] - b->lo[0], y = b->hi[1] - b->lo[1], z = b->hi[2] - b->lo[2];
+    return x >= 0 ? x * y + y * z + z * x : 0;
+}
+
+/* Twice the centre of a box along an axis. */
+PTI_INLINE double pti_centre(pt_vec3 lo, pt_vec3 hi, int axis)
+{
+    return axis == 0 ? (double)lo.x + (double)hi.x : axis == 1 ? (double)lo.y + (double)hi.y : (double)lo.z + (double)hi.z;
+}
+
+typedef struct pti_bin {
+    pti_bounds bounds;
+    uint32_t count;
+} pti_bin;
+
+typedef struct pti_split {
+    int axis, bin; /* a primitive goes left if its centre falls into a bin below this one                  */
+    double cost;
+} pti_split;
+
+/* What the builder works on. */
+typedef struct pti_builder {
+    pt_bvh *bvh;
+    const pt_vec3 *lo, *hi;
+} pti_builder;
+
+static int pti_bin_of(double c, double lo, double scale)
+{
+    double x = (c - lo) * scale;
+    return x < PTI_BINS - 1 ? (x > 0 ? (int)x : 0) : PTI_BINS - 1; /* clamped before the cast, also NaN */
+}
+
+/* The best of the 15 planes between the bins of one axis; sweeps from both sides. */
+static void pti_sweep(const pti_bin *bins, int axis, pti_split *best)
+{
+    double right[PTI_BINS];
+    pti_bounds box = pti_bounds_empty();
+    uint32_t count = 0;
+    int i;
+    for (i = PTI_BINS - 1; i > 0; i--) {
+        pti_bounds_join(&box, &bins[i].bounds);
+        count += bins[i].count;
+        right[i] = pti_bounds_half_area(&box) * count;
+    }
+    box = pti_bounds_empty();
+    count = 0;
+    for (i = 1; i < PTI_BINS; i++) {
+        double cost;
+        pti_bounds_join(&box, &bins[i - 1].bounds);
+        count += bins[i - 1].count;
+        cost = pti_bounds_half_area(&box) * count + right[i];
+        if (cost < best->cost) {
+            best->cost = cost;
+            best->axis = axis;
+            best->bin = i;
+        }
+    }
+}
+
+/* The best split of order[begin..end), axis -1 if all centres coincide. */
+static pti_split pti_find_split(const pti_builder *b, uint32_t begin, uint32_t end, pti_bounds *centres)
+{
+    pti_bin bins[3][PTI_BINS];
+    pti_split best;
+    double scale[3];
+    uint32_t i;
+    int k, j;
+    *centres = pti_bounds_empty();
+    for (i = begin; i < end; i++) {
+        uint32_t p = b->bvh->order[i];
+        pt_vec3 c = pt_v3_add(b->lo[p], b->hi[p]);
+        pti_bounds_add(centres, c, c);
+    }
+    for (k = 0; k < 3; k++) {
+        double extent = centres->hi[k] - centres->lo[k];
+        scale[k] = extent > 0 ? PTI_BINS / extent : 0;
+        for (j = 0; j < PTI_BINS; j++) {
+            bins[k][j].bounds = pti_bounds_empty();
+            bins[k][j].count = 0;
+        }
+    }
+    for (i = begin; i < end; i++) {
+        uint32_t p = b->bvh->order[i];
+        for (k = 0; k < 3; k++) {
+            pti_bin *bin = &bins[k][pti_bin_of(pti_centre(b->lo[p], b->hi[p], k), centres->lo[k], scale[k])];
+            pti_bounds_add(&bin->bounds, b->lo[p], b->hi[p]);
+            bin->count++;
+        }
+    }
+    best.axis = -1;
+    best.bin = 0;
+    best.cost = HUGE_VAL;
+    for (k = 0; k < 3; k++)
+        if (scale[k] > 0) pti_sweep(bins[k], k, &best);
+    return best;
+}
+
+/* Moves what goes left to the front; returns the first of the right. */
+static uint32_t pti_partition(const pti_builder *b, uint32_t begin, uint32_t end, const pti_split *s,
+                              const pti_bounds *centres)
+{
+    double lo = centres->lo[s->axis], scale = PTI_BINS / (centres->hi[s->axis] - lo);
+    uint32_t *order = b->bvh->order, left = begin, i;
+    for (i = begin; i < end; i++) {
+        uint32_t p = order[i];
+        if (pti_bin_of(pti_centre(b->lo[p], b->hi[p], s->axis), lo, scale) < s->bin) {
+            order[i] = order[left];
+            order[left++] = p;
+        }
+    }
+    return left;
+}
+
+static pti_bounds pti_range_bounds(const pti_builder *b, uint32_t begin, uint32_t end)
+{
+    pti_bounds box = pti_bounds_empty();
+    uint32_t i;
+    for (i = begin; i < end; i++) pti_bounds_add(&box, b->lo[b->bvh->order[i]], b->hi[b->bvh->order[i]]);
+    return box;
+}
+
+/* Where to cut order[begin..end), or 0 for a leaf. Cost of a box test : cost of a primitive = 1 : 1. */
+static uint32_t pti_cut_list(const pti_builder *b, uint32_t begin, uint32_t end, const pti_bounds *box, int depth)
+{
+    uint32_t n = end - begin, middle = begin + n / 2, cut;
+    pti_bounds centres;
+    pti_split split;
+    double area = pti_bounds_half_area(box);
+    if (n <= 1) return 0;
+    if (depth >= PT_BVH_MAX_DEPTH / 2) return n <= PTI_LEAF_MAX ? 0 : middle;
+    split = pti_find_split(b, begin, end, &centres);
+    if (split.axis < 0) return n <= PTI_LEAF_MAX ? 0 : middle;
+    if (n <= PTI_LEAF_MAX && split.cost + area >= area * n) return 0;
+    cut = pti_partition(b, begin, end, &split, &centres);
+    return cut > begin && cut < end ? cut : middle;
+}
+
+/* Splits until nothing is left to split; the stack holds nodes with their depth. */
+static void pti_build_nodes(const pti_builder *b)
+{
+    uint32_t stack[2 * PT_BVH_MAX_DEPTH];
+    int depths[2 * PT_BVH_MAX_DEPTH], top = 0;
+    pt_bvh *bvh = b->bvh;
+    stack[0] = 0;
+    depths[0] = 0;
+    bvh->nodes[0].first = 0;
+    bvh->nodes[0].count = bvh->primitive_count;
+    bvh->node_count = 1;
+    for (top = 1; top > 0;) {
+        pt_bvh_node *node = &bvh->nodes[stack[--top]];
+        uint32_t begin = node->first, end = begin + node->count, cut;
+        int depth = depths[top];
+        pti_bounds box = pti_range_bounds(b, begin, end);
+        node->lo = pt_v3((pt_real)box.lo[0], (pt_real)box.lo[1], (pt_real)box.lo[2]);
+        node->hi = pt_v3((pt_real)box.hi[0], (pt_real)box.hi[1], (pt_real)box.hi[2]);
+        if (depth > bvh->depth) bvh->depth = depth;
+        cut = pti_cut_list(b, begin, end, &box, depth);
+        if (cut == 0) continue;
+        node->first = bvh->node_count;
+        node->count = 0;
+        bvh->nodes[bvh->node_count].first = begin;
+        bvh->nodes[bvh->node_count].count = cut - begin;
+        bvh->nodes[bvh->node_count + 1].first = cut;
+        bvh->nodes[bvh->node_count + 1].count = end - cut;
+        stack[top] = bvh->node_count + 1;
+        depths[top++] = depth + 1;
+        stack[top] = bvh->node_count;
+        depths[top++] = depth + 1;
+        bvh->node_count += 2;
+    }
+}
+
+PTDEF pt_result pt_bvh_build(pt_bvh *bvh, const pt_vec3 *lo, const pt_vec3 *hi, uint32_t count, void *alloc_user)
+{
+    pti_builder b;
+    uint32_t i;
+    memset(bvh, 0, sizeof *bvh);
+    if (count == 0) return PT_OK;
+    if (count > 0x7fffffffu) return PT_ERROR_ARGUMENT;
+    bvh->nodes = (pt_bvh_node *)pti_alloc(2 * (size_t)count, sizeof *bvh->nodes, alloc_user);
+    bvh->order = (uint32_t *)pti_alloc(count, sizeof *bvh->order, alloc_user);
+    if (!bvh->nodes || !bvh->order) {
+        pt_bvh_free(bvh, alloc_user);
+        return PT_ERROR_MEMORY;
+    }
+    for (i = 0; i < count; i++) bvh->order[i] = i;
+    bvh->primitive_count = count;
+    b.bvh = bvh;
+    b.lo = lo;
+    b.hi = hi;
+    pti_build_nodes(&b);
+    return PT_OK;
+}
+
+PTDEF void pt_bvh_free(pt_bvh *bvh, void *alloc_user)
+{
+    pti_free(bvh->nodes, alloc_user);
+    pti_free(bvh->order, alloc_user);
+    memset(bvh, 0, sizeof *bvh);
+}
+
+/* best->t as a limit for boxes, rounded up. */
+PTI_INLINE pt_real pti_box_limit(double t)
+{
+    return (pt_real)t * PTI_R(1 + 4 * PTI_UNIT_ROUNDOFF);
+}
+
+/* Walks the tree, near child first; any = 1 stops at the first hit. */
+static int pti_traverse(const pt_scene *scene, const pti_ray *r, pti_best *best, int any)
+{
+    const pt_bvh_node *nodes = scene->bvh.nodes, *node = nodes;
+    uint32_t stack[PT_BVH_MAX_DEPTH + 1];
+    pt_real entries[PT_BVH_MAX_DEPTH + 1], limit = pti_box_limit(best->t), e0, e1;
+    int top = 0, found = 0;
+    uint32_t i;
+    if (!pti_box(r, node->lo, node->hi, limit, &e0)) return 0;
+    for (;;) {
+        if (node->count > 0) {
+            for (i = 0; i < node->count; i++) {
+                if (!pti_test(scene, r, (int)scene->bvh.order[node->first + i], best)) continue;
+                if (any) return 1;
+                found = 1;
+                limit = pti_box_limit(best->t);
+            }
+        } else {
+            const pt_bvh_node *a = &nodes[node->first], *b = a + 1;
+            int in_a = pti_box(r, a->lo, a->hi, limit, &e0), in_b = pti_box(r, b->lo, b->hi, limit, &e1);
+            if (in_a && in_b) {
+                int swap = e1 < e0;
+                stack[top] = node->first + (swap ? 0u : 1u);
+                entries[top++] = swap ? e0 : e1;
+                node = swap ? b : a;
+                continue;
+            }
+            if (in_a || in_b) {
+                node = in_a ? a : b;
+                continue;
+            }
+        }
+        do {
+            if (top == 0) return found;
+            top--;
+        } while (entries[top] > limit);
+        node = &nodes[stack[top]];
+    }
+}
+
+#endif /* PTI_HAS_BVH */
+
+/* Up to this many primitives are tested one by one: there a tree does not pay (make bench). */
+#define PTI_LINEAR_MAX 4
+
+/* The nearest hit, or any. */
+static int pti_search(const pt_scene *scene, const pti_ray *r, double tmax, pti_best *best, int any)
+{
+    int i, n = (int)scene->primitive_count, found = 0;
+    best->t = tmax;
+    best->u = best->v = 0;
+    best->primitive = -1;
+#if PTI_HAS_BVH
+    if (scene->bvh.node_count > 0) return pti_traverse(scene, r, best, any);
+#endif
+    for (i = 0; i < n; i++)
+        if (pti_test(scene, r, i, best)) {
+            if (any) return 1;
+            found = 1;
+        }
+    return found;
+}
+
+/* =====================================================================================================
+   [PT-08] MATERIALS: implementation
+   =====================================================================================================
+   The BSDF f(wo, wi) is the radiance scattered into wo per irradiance from wi. Three functions belong
+   together: eval gives f, sample draws wi with a density close to f |cos|, pdf gives that density. They must
+   agree: E[f |cos| / pdf] over sample's directions is the albedo, which a test checks for each material.
+   Delta lobes (mirror, glass) have no finite f: their sample carries the weight f |cos| / pdf, in which the
+   delta cancels, and eval and pdf are zero, because no other technique finds that direction.
+
+   On which side a direction lies is decided by the geometric normal, cosines are of the shading normal. A
+   direction on the right side of one and the wrong side of the other scatters nothing, in eval and sample
+   alike. */
+
+PTDEF pt_material pt_material_diffuse(pt_rgb albedo)
+{
+    pt_material m;
+    memset(&m, 0, sizeof m);
+    m.albedo = albedo;
+    return m;
+}
+
+PTDEF pt_material pt_material_emitter(pt_rgb radiance)
+{
+    pt_material m = pt_material_diffuse(pt_rgb_grey(0));
+    m.emission = radiance;
+    return m;
+}
+
+PTDEF pt_material pt_material_mirror(pt_rgb reflectance)
+{
+    pt_material m = pt_material_diffuse(reflectance);
+    m.kind = PT_MATERIAL_MIRROR;
+    return m;
+}
+
+PTDEF pt_material pt_material_dielectric(pt_real ior)
+{
+    pt_material m = pt_material_diffuse(pt_rgb_grey(0));
+    m.kind = PT_MATERIAL_DIELECTRIC;
+    m.ior = ior;
+    return m;
+}
+
+PTDEF double pt_fresnel_dielectric(double cos_i, double eta, double *cos_t)
+{
+    /* Fresnel's r_s = (c - eta t)/(c + eta t) and r_p = (eta c - t)/(eta c + t) with the numerators multiplied
+       out by Snell's law eta^2 (1 - t^2) = 1 - c^2, so that nothing cancels for eta near 1:
+           r_s = -(eta-1)(eta+1) / (c + eta t)^2
+           r_p =  (eta-1)(eta+1) ((c eta)^2 - (1-c)(1+c)) / (eta (eta c + t))^2
+       t^2 = 1 - (1 - c^2)/eta^2, in the form that keeps digits near c = 0 and near c = 1. */
+    double e = eta, c = fmin(1, fabs(cos_i)), d = (e - 1) * (e + 1), t2, t, rs, rp;
+    t2 = c * c < 0.5 ? (d + c * c) / (e * e) : 1 - (1 - c) * (1 + c) / (e * e);
+    *cos_t = 0;
+    if (!(t2 > 0)) return 1;
+    t = sqrt(t2);
+    *cos_t = t;
+    if (d == 0) return 0;
+    rs = -d / ((c + e * t) * (c + e * t));
+    rp = d * ((c * e) * (c * e) - (1 - c) * (1 + c)) / (e * e * (e * c + t) * (e * c + t));
+    return fmin(1, 0.5 * (rs * rs + rp * rp));
+}
+
+static unsigned pti_material_lobes(const pt_material *m)
+{
+    if (m->kind == PT_MATERIAL_DIFFUSE) return pti_rgb_black(m->albedo) ? 0u : (unsigned)PT_LOBE_DIFFUSE;
+    return PT_LOBE_SPECULAR;
+}
+
+PTDEF pt_bsdf pt_bsdf_make(const pt_material *m, const pt_hit *hit)
+{
+    pt_bsdf b;
+    b.material = m;
+    b.frame = pt_frame_from_normal(hit->ns);
+    b.ng = hit->ng;
+    b.lobes = pti_material_lobes(m);
+    return b;
+}
+
+/* +1 if w is on the side of ng, -1 on the other. */
+PTI_INLINE pt_real pti_side(const pt_bsdf *b, pt_vec3 w)
+{
+    return pt_v3_dot(w, b->ng) >= 0 ? PTI_R(1) : PTI_R(-1);
+}
+
+/* Cosine of wi with the shading normal on wo's side, 0 if reflection from wo to wi is impossible. */
+PTI_INLINE pt_real pti_reflection_cosine(const pt_bsdf *b, pt_vec3 wo, pt_vec3 wi)
+{
+    pt_real side = pti_side(b, wo), c = side * pt_v3_dot(wi, b->frame.n);
+    return c > 0 && side * pt_v3_dot(wi, b->ng) > 0 ? c : 0;
+}
+
+PTDEF pt_rgb pt_bsdf_eval(const pt_bsdf *b, pt_vec3 wo, pt_vec3 wi, pt_transport mode, unsigned lobes)
+{
+    (void)mode;
+    if (!(b->lobes & lobes & PT_LOBE_DIFFUSE) || !(pti_reflection_cosine(b, wo, wi) > 0)) return pt_rgb_grey(0);
+    return pt_rgb_scale(b->material->albedo, PTI_R(1 / PT_PI));
+}
+
+PTDEF pt_real pt_bsdf_pdf_w(const pt_bsdf *b, pt_vec3 wo, pt_vec3 wi, pt_transport mode)
+{
+    (void)mode;
+    if (!(b->lobes & PT_LOBE_DIFFUSE)) return 0;
+    return pt_warp_cosine_pdf_w(pt_v3(0, 0, pti_reflection_cosine(b, wo, wi)));
+}
+
+static int pti_sample_diffuse(const pt_bsdf *b, pt_vec3 wo, pt_vec2 u, pt_bsdf_sample_result *out)
+{
+    pt_vec3 local = pt_warp_cosine(u);
+    local.z *= pti_side(b, wo);
+    out->wi = pt_frame_to_world(&b->frame, local);
+    out->weight = b->material->albedo;
+    out->pdf_w = pt_bsdf_pdf_w(b, wo, out->wi, PT_RADIANCE);
+    out->pdf_rev_w = pt_bsdf_pdf_w(b, out->wi, wo, PT_RADIANCE);
+    out->lobe = PT_LOBE_DIFFUSE;
+    return out->pdf_w > 0;
+}
+
+/* The normal of a mirror or of glass on wo's side: the shading normal, or the geometric one where wo is
+   behind that. */
+static pti_d3 pti_specular_normal(const pt_bsdf *b, pt_vec3 wo, double *cos_o)
+{
+    double side = (double)pti_side(b, wo);
+    pti_d3 n = pti_d_scale(pti_d_from(b->frame.n), side);
+    *cos_o = pti_d_dot(n, pti_d_from(wo));
+    if (*cos_o > 0) return n;
+    n = pti_d_scale(pti_d_from(b->ng), side);
+    *cos_o = fmax(0, pti_d_dot(n, pti_d_from(wo)));
+    return n;
+}
+
+static int pti_sample_reflection(const pt_bsdf *b, pt_vec3 wo, pti_d3 n, double cos_o, pt_bsdf_sample_result *out)
+{
+    out->wi = pti_d_to(pti_d_normalize(pti_d_sub(pti_d_scale(n, 2 * cos_o), pti_d_from(wo))));
+    out->lobe = PT_LOBE_SPECULAR;
+    return pti_side(b, wo) * pt_v3_dot(out->wi, b->ng) > 0;
+}
+
+static int pti_sample_dielectric(const pt_bsdf *b, pt_vec3 wo, pt_real u_lobe, pt_transport mode,
+                                 pt_bsdf_sample_result *out)
+{
+    double ior = b->material->ior > 0 ? (double)b->material->ior : 1.5, cos_o, cos_t, f, eta;
+    pti_d3 n = pti_specular_normal(b, wo, &cos_o), w;
+    eta = pti_side(b, wo) > 0 ? ior : 1 / ior;
+    f = pt_fresnel_dielectric(cos_o, eta, &cos_t);
+    if ((double)u_lobe < f) {
+        out->pdf_w = out->pdf_rev_w = (pt_real)f;
+        return pti_sample_reflection(b, wo, n, cos_o, out);
+    }
+    w = pti_d_sub(pti_d_scale(n, cos_o / eta - cos_t), pti_d_scale(pti_d_from(wo), 1 / eta));
+    out->wi = pti_d_to(pti_d_normalize(w));
+    out->pdf_w = out->pdf_rev_w = (pt_real)(1 - f);
+    if (mode == PT_RADIANCE) out->weight = pt_rgb_grey((pt_real)(1 / (eta * eta))); /* [Vea97] 5.2 */
+    out->eta = (pt_real)eta;
+    out->lobe = PT_LOBE_SPECULAR;
+    return pti_side(b, wo) * pt_v3_dot(out->wi, b->ng) < 0;
+}
+
+PTDEF int pt_bsdf_sample(const pt_bsdf *b, pt_vec3 wo, pt_real u_lobe, pt_vec2 u, pt_transport mode,
+                         pt_bsdf_sample_result *out)
+{
+    pti_d3 n;
+    double cos_o;
+    if (!b->lobes) return 0;
+    out->eta = 1;
+    if (b->material->kind == PT_MATERIAL_DIFFUSE) return pti_sample_diffuse(b, wo, u, out);
+    out->weight = pt_rgb_grey(1);
+    if (b->material->kind == PT_MATERIAL_DIELECTRIC) return pti_sample_dielectric(b, wo, u_lobe, mode, out);
+    out->weight = b->material->albedo;
+    out->pdf_w = out->pdf_rev_w = 1;
+    n = pti_specular_normal(b, wo, &cos_o);
+    return pti_sample_reflection(b, wo, n, cos_o, out);
+}
+
+/* =====================================================================================================
+   [PT-09] LIGHTS: implementation
+   =====================================================================================================
+   Direct light is the integral of f L cos over the directions in which lights are seen. Sampling it by the
+   area of a light puts cos'/d^2 into the integrand, which explodes where the light is near; sampling it by
+   the solid angle under which the light is seen leaves f cos only. So: spheres by the cone that they fill,
+   rectangles and triangles by their spherical images. The density is one over that solid angle for each, and
+   pt_light_pdf_w computes it from the same functions that the samplers use. */
+
+/* Perpendicular up to the rounding of the edges themselves. */
+static int pti_is_rectangle(const pt_parallelogram *s)
+{
+    pti_d3 a = pti_d_from(s->edge1), b = pti_d_from(s->edge2);
+    return fabs(pti_d_dot(a, b)) <= 4 * PTI_UNIT_ROUNDOFF * pti_d_length(a) * pti_d_length(b);
+}
+
+/* How a flat light is seen from a point. */
+typedef struct pti_flat {
+    pt_spherical_triangle half[2];
+    pt_spherical_rectangle rectangle;
+    int is_rectangle;
+    double solid_angle;
+    pti_d3 corner, n;       /* a corner relative to the point, and the (unscaled) normal                   */
+    pti_d3 warp;            /* how far a parallelogram's rounded corners are off that plane, a coordinate  */
+} pti_flat;
+
+/* Sets up for a triangle or parallelogram light; 0 if p is behind it or in its plane. */
+static int pti_flat_make(pti_flat *f, const pt_scene *scene, const pt_primitive *primitive, pt_vec3 p)
+{
+    pt_vec3 v[4];
+    if (primitive->shape == PT_SHAPE_TRIANGLE) {
+        const pt_triangle *s = &scene->triangles[primitive->index];
+        v[0] = scene->positions[s->v[0]];
+        v[1] = scene->positions[s->v[1]];
+        v[2] = v[3] = scene->positions[s->v[2]];
+    } else {
+        pti_parallelogram_corners(&scene->parallelograms[primitive->index], v);
+    }
+    f->warp = pti_d_add(pti_d_abs(pti_d_from(v[1])), pti_d_add(pti_d_abs(pti_d_from(v[2])), pti_d_abs(pti_d_from(v[3]))));
+    f->warp = pti_d_scale(f->warp, primitive->shape == PT_SHAPE_PARALLELOGRAM ? PTI_UNIT_ROUNDOFF : 0);
+    f->corner = pti_d_between(p, v[0]);
+    f->n = pti_d_cross(pti_d_between(v[0], v[1]), pti_d_between(v[0], v[2]));
+    if (!(pti_d_dot(f->corner, f->n) < 0)) return 0;
+    f->is_rectangle = primitive->shape == PT_SHAPE_PARALLELOGRAM && pti_is_rectangle(&scene->parallelograms[primitive->index]);
+    if (f->is_rectangle) {
+        const pt_parallelogram *s = &scene->parallelograms[primitive->index];
+        f->solid_angle = pt_spherical_rectangle_make(&f->rectangle, p, s->corner, s->edge1, s->edge2);
+    } else {
+        f->solid_angle = pt_spherical_triangle_make(&f->half[0], p, v[0], v[1], v[2]);
+        f->half[1].solid_angle = 0;
+        if (primitive->shape == PT_SHAPE_PARALLELOGRAM)
+            f->solid_angle += pt_spherical_triangle_make(&f->half[1], p, v[0], v[2], v[3]);
+    }
+    return f->solid_angle > 0;
+}
+
+static pti_d3 pti_flat_direction(const pti_flat *f, double u0, double u1)
+{
+    double first;
+    if (f->is_rectangle) return pti_spherical_rectangle_direction(&f->rectangle, u0, u1);
+    first = f->half[0].solid_angle / f->solid_angle;
+    if (u0 < first || f->half[1].solid_angle == 0)
+        return pti_spherical_triangle_direction(&f->half[0], fmin(1, u0 / first), u1);
+    return pti_spherical_triangle_direction(&f->half[1], (u0 - first) / (1 - first), u1);
+}
+
+static int pti_sample_flat(const pt_scene *scene, const pt_primitive *primitive, pt_vec3 p, pt_vec2 u,
+                           pt_light_sample_result *out)
+{
+    pti_flat f;
+    pti_d3 w, q, o = pti_d_from(p), size;
+    double t;
+    if (!pti_flat_make(&f, scene, primitive, p)) return 0;
+    w = pti_flat_direction(&f, (double)u.x, (double)u.y);
+    t = pti_d_dot(f.corner, f.n) / pti_d_dot(w, f.n);
+    if (!(t > 0) || !pti_finite(t)) return 0;
+    q = pti_d_add(o, pti_d_scale(w, t));
+    size = pti_d_add(pti_d_abs(pti_d_add(o, f.corner)), pti_d_add(pti_d_abs(o), pti_d(t, t, t)));
+    out->p = pti_d_to(q);
+    out->p_error = pt_v3(pti_point_error(out->p.x, size.x) + (pt_real)f.warp.x, pti_point_error(out->p.y, size.y) + (pt_real)f.warp.y,
+                         pti_point_error(out->p.z, size.z) + (pt_real)f.warp.z);
+    out->n = pti_d_to(pti_d_normalize(f.n));
+    out->wi = pti_d_to(w);
+    out->distance = (pt_real)t;
+    out->pdf_w = (pt_real)(1 / f.solid_angle);
+    return 1;
+}
+
+/* 1 - cos of the half angle under which a sphere is seen from outside: s^2 / (1 + sqrt(1 - s^2)), s = r/d. */
+static double pti_sphere_omc(double r, double d)
+{
+    double s = r / d;
+    return s * s / (1 + sqrt((1 - s) * (1 + s)));
+}
+
+static int pti_sample_sphere_light(const pt_sphere *s, pt_vec3 p, pt_vec2 u, pt_light_sample_result *out)
+{
+    pti_d3 o = pti_d_from(p), c = pti_d_from(s->centre), axis = pti_d_sub(c, o), w, n;
+    double r = (double)s->radius, d = pti_d_length(axis), t, x, m, sin2;
+    pt_frame frame;
+    pt_vec3 l;
+    if (d > r) {
+        double omc = pti_sphere_omc(r, d), phi = 2 * PT_PI * (double)u.y;
+        frame = pt_frame_from_normal(pti_d_to(pti_d_normalize(axis)));
+        x = (double)u.x * omc;
+        sin2 = x * (2 - x);
+        l = pt_frame_to_world(&frame, pt_v3((pt_real)cos(phi), (pt_real)sin(phi), 0));
+        w = pti_d_add(pti_d_scale(axis, (1 - x) / d), pti_d_scale(pti_d_from(l), sqrt(sin2)));
+        t = d * (1 - x) - sqrt(fmax(0, r * r - d * d * sin2)); /* the near side */
+        out->pdf_w = (pt_real)pt_warp_cone_pdf_w(omc);
+    } else {
+        w = pti_d_from(pt_warp_sphere(u));
+        x = pti_d_dot(w, axis);
+        t = x + sqrt(fmax(0, (r - d) * (r + d) + x * x)); /* the far side */
+        out->pdf_w = pt_warp_sphere_pdf_w();
+    }
+    n = pti_d_normalize(pti_d_sub(pti_d_scale(w, t), axis));
+    m = fabs(c.x) + fabs(c.y) + fabs(c.z) + r + d;
+    out->p = pti_d_to(pti_d_add(c, pti_d_scale(n, r)));
+    out->p_error = pt_v3(pti_point_error(out->p.x, m), pti_point_error(out->p.y, m), pti_point_error(out->p.z, m));
+    out->n = pti_d_to(n);
+    out->wi = pti_d_to(pti_d_normalize(w));
+    out->distance = (pt_real)t;
+    return t > 0;
+}
+
+static void pti_sample_environment(const pt_scene *scene, pt_vec3 p, pt_vec2 u, pt_light_sample_result *out)
+{
+    pt_vec3 size = pt_v3_sub(scene->hi, scene->lo);
+    out->wi = pt_warp_sphere(u);
+    out->distance = 2 * pt_v3_length(size) + pt_v3_length(pt_v3_sub(p, scene->lo));
+    out->p = pt_v3_add(p, pt_v3_scale(out->wi, out->distance));
+    out->p_error = out->n = pt_v3(0, 0, 0);
+    out->pdf_w = pt_warp_sphere_pdf_w();
+}
+
+static int pti_sample_point_light(const pt_light *light, pt_vec3 p, pt_light_sample_result *out)
+{
+    pti_d3 d = pti_d_between(p, light->position);
+    double d2 = pti_d_dot(d, d);
+    if (!(d2 > 0)) return 0;
+    out->wi = pti_d_to(pti_d_normalize(d));
+    out->distance = (pt_real)sqrt(d2);
+    out->p = light->position;
+    out->p_error = out->n = pt_v3(0, 0, 0);
+    out->radiance = pt_rgb3((pt_real)((double)light->emission.r / d2), (pt_real)((double)light->emission.g / d2),
+                            (pt_real)((double)light->emission.b / d2));
+    out->pdf_w = 1;
+    out->delta = 1;
+    return 1;
+}
+
+PTDEF int pt_light_sample(const pt_scene *scene, int light, pt_vec3 p, pt_vec2 u, pt_light_sample_result *out)
+{
+    const pt_light *l;
+    const pt_primitive *primitive;
+    if (light < 0 || (uint32_t)light >= scene->light_count) return 0;
+    l = &scene->lights[light];
+    out->delta = 0;
+    out->radiance = l->emission;
+    if (l->kind == PT_LIGHT_POINT) return pti_sample_point_light(l, p, out);
+    if (l->kind == PT_LIGHT_ENVIRONMENT) {
+        pti_sample_environment(scene, p, u, out);
+        return 1;
+    }
+    primitive = &scene->primitives[l->primitive];
+    if (primitive->shape == PT_SHAPE_SPHERE) return pti_sample_sphere_light(&scene->spheres[primitive->index], p, u, out);
+    return pti_sample_flat(scene, primitive, p, u, out);
+}
+
+PTDEF pt_real pt_light_pdf_w(const pt_scene *scene, int light, pt_vec3 p, const pt_hit *hit)
+{
+    const pt_primitive *primitive;
+    pti_flat f;
+    if (light < 0 || (uint32_t)light >= scene->light_count || scene->lights[light].kind == PT_LIGHT_POINT) return 0;
+    if (scene->lights[light].kind == PT_LIGHT_ENVIRONMENT) return hit ? 0 : pt_warp_sphere_pdf_w();
+    if (!hit || hit->primitive != scene->lights[light].primitive) return 0;
+    primitive = &scene->primitives[hit->primitive];
+    if (primitive->shape == PT_SHAPE_SPHERE) {
+        const pt_sphere *s = &scene->spheres[primitive->index];
+        double r = (double)s->radius, d = pti_d_length(pti_d_between(p, s->centre));
+        return d > r ? (pt_real)pt_warp_cone_pdf_w(pti_sphere_omc(r, d)) : pt_warp_sphere_pdf_w();
+    }
+    return pti_flat_make(&f, scene, primitive, p) ? (pt_real)(1 / f.solid_angle) : 0;
+}
+
+PTDEF int pt_light_choose(const pt_scene *scene, pt_real u, pt_real *pmf)
+{
+    double p;
+    uint32_t i;
+    *pmf = 0;
+    if (scene->light_table.count == 0) return -1;
+    i = pt_alias_sample(&scene->light_table, (double)u, &p);
+    *pmf = (pt_real)p;
+    return (int)i;
+}
+
+/* Radius of the sphere around the scene's box; 1 for an empty scene. */
+static double pti_scene_radius(const pt_scene *scene)
+{
+    double r = 0.5 * pti_d_length(pti_d_between(scene->lo, scene->hi));
+    return r > 0 ? r : 1;
+}
+
+/* A uniform point of an area light with its normal. */
+static void pti_light_point(const pt_scene *scene, const pt_primitive *primitive, pt_vec2 u, pt_hit *hit)
+{
+    if (primitive->shape == PT_SHAPE_SPHERE) {
+        const pt_sphere *s = &scene->spheres[primitive->index];
+        pt_vec3 n = pt_warp_sphere(u);
+        double r = (double)s->radius;
+        hit->ng = n;
+        pti_set_point(hit, pti_d_add(pti_d_from(s->centre), pti_d_scale(pti_d_normalize(pti_d_from(n)), r)),
+                      pti_d_add(pti_d_abs(pti_d_from(s->centre)), pti_d(r, r, r)));
+    } else if (primitive->shape == PT_SHAPE_TRIANGLE) {
+        const pt_triangle *s = &scene->triangles[primitive->index];
+        pt_vec2 b = pt_warp_triangle(u);
+        pti_fill_corners(hit, scene->positions[s->v[0]], scene->positions[s->v[1]], scene->positions[s->v[2]],
+                         (double)b.x, (double)b.y);
+    } else {
+        pti_fill_parallelogram(hit, &scene->parallelograms[primitive->index], (double)u.x, (double)u.y);
+    }
+}
+
+static void pti_le_area(const pt_scene *scene, const pt_light *l, pt_vec2 u_p, pt_vec2 u_w, pt_real u_side,
+                        pt_light_emission_result *out)
+{
+    const pt_primitive *primitive = &scene->primitives[l->primitive];
+    pt_vec3 local = pt_warp_cosine(u_w);
+    pt_frame frame;
+    pt_hit hit;
+    pti_light_point(scene, primitive, u_p, &hit);
+    if (primitive->shape == PT_SHAPE_SPHERE && u_side < PTI_R(0.5)) local.z = -local.z;
+    frame = pt_frame_from_normal(hit.ng);
+    out->p = hit.p;
+    out->p_error = hit.p_error;
+    out->n = hit.ng;
+    out->w = pt_frame_to_world(&frame, local);
+    out->cos_n = fabs((double)local.z);
+}
+
+static void pti_le_environment(const pt_scene *scene, pt_vec2 u_p, pt_vec2 u_w, pt_light_emission_result *out)
+{
+    pti_d3 centre = pti_d_scale(pti_d_add(pti_d_from(scene->lo), pti_d_from(scene->hi)), 0.5);
+    double r = pti_scene_radius(scene);
+    pt_vec2 disk = pt_warp_disk(u_p);
+    pt_frame frame;
+    out->w = pt_warp_sphere(u_w);
+    frame = pt_frame_from_normal(out->w);
+    out->p = pti_d_to(pti_d_add(centre, pti_d_scale(pti_d_from(pt_frame_to_world(&frame, pt_v3(disk.x, disk.y, -1))), r)));
+    out->p_error = out->n = pt_v3(0, 0, 0);
+    out->cos_n = 1;
+}
+
+PTDEF int pt_light_sample_le(const pt_scene *scene, int light, pt_vec2 u_p, pt_vec2 u_w, pt_real u_side,
+                             pt_light_emission_result *out)
+{
+    const pt_light *l;
+    if (light < 0 || (uint32_t)light >= scene->light_count) return 0;
+    l = &scene->lights[light];
+    out->radiance = l->emission;
+    if (l->kind == PT_LIGHT_AREA) {
+        pti_le_area(scene, l, u_p, u_w, u_side, out);
+    } else if (l->kind == PT_LIGHT_ENVIRONMENT) {
+        pti_le_environment(scene, u_p, u_w, out);
+    } else {
+        out->p = l->position;
+        out->p_error = out->n = pt_v3(0, 0, 0);
+        out->w = pt_warp_sphere(u_w);
+        out->cos_n = 1;
+    }
+    pt_light_pdf_le(scene, light, out->n, out->w, &out->pdf_a, &out->pdf_w);
+    return out->pdf_w > 0;
+}
+
+PTDEF void pt_light_pdf_le(const pt_scene *scene, int light, pt_vec3 n, pt_vec3 w, double *pdf_a, double *pdf_w)
+{
+    const pt_light *l = &scene->lights[light];
+    double r = pti_scene_radius(scene), c = (double)pt_v3_dot(n, w);
+    *pdf_a = 1;
+    *pdf_w = (double)pt_warp_sphere_pdf_w();
+    if (l->kind == PT_LIGHT_ENVIRONMENT) *pdf_a = 1 / (PT_PI * r * r);
+    if (l->kind != PT_LIGHT_AREA) return;
+    *pdf_a = 1 / l->area;
+    if (scene->primitives[l->primitive].shape == PT_SHAPE_SPHERE) *pdf_w = fabs(c) / (2 * PT_PI); /* both sides */
+    else *pdf_w = fmax(0, c) / PT_PI;
+}
+
+PTDEF pt_rgb pt_hit_emission(const pt_scene *scene, const pt_hit *hit, pt_vec3 wo)
+{
+    if (hit->light < 0) return pt_rgb_grey(0);
+    if (hit->shape != PT_SHAPE_SPHERE && !(pt_v3_dot(wo, hit->ng) > 0)) return pt_rgb_grey(0);
+    return scene->materials[hit->material].emission;
+}
+
+/* =====================================================================================================
+   [PT-10] SCENE, CAMERA, FILM: implementation
+   ===================================================================================================== */
+
+/* --- text without stdio and without a locale --- */
+
+/* Appends to a string in a buffer of `size` bytes; what does not fit is cut. */
+static void pti_append(char *buffer, size_t size, const char *text)
+{
+    size_t n = strlen(buffer);
+    while (*text && n + 1 < size) buffer[n++] = *text++;
+    buffer[n] = 0;
+}
+
+static void pti_append_integer(char *buffer, size_t size, uint64_t value)
+{
+    char digits[24];
+    int i = 23;
+    digits[i] = 0;
+    do {
+        digits[--i] = (char)('0' + (int)(value % 10));
+        value /= 10;
+    } while (value);
+    pti_append(buffer, size, digits + i);
+}
+
+/* Up to six significant digits, as %g would print in the C locale. */
+static void pti_append_real(char *buffer, size_t size, double x)
+{
+    char text[40] = "";
+    uint64_t m;
+    int e, digits = 6, i;
+    if (!pti_finite(x)) {
+        pti_append(buffer, size, x != x ? "nan" : x < 0 ? "-inf" : "inf");
+        return;
+    }
+    if (x < 0) pti_append(buffer, size, "-");
+    x = fabs(x);
+    e = x > 0 ? (int)floor(log10(x)) : 0;
+    m = (uint64_t)(x / pow(10, e) * 1e5 + 0.5); /* d.ddddd as an integer */
+    if (m >= 1000000) {
+        m /= 10;
+        e++;
+    }
+    while (digits > 1 && m % 10 == 0) {
+        m /= 10;
+        digits--;
+    }
+    if (e < -4 || e >= 6) { /* d.ddde+-x */
+        pti_append_integer(text, sizeof text, m);
+        if (digits > 1) {
+            memmove(text + 2, text + 1, (size_t)digits);
+            text[1] = '.';
+        }
+        pti_append(text, sizeof text, e < 0 ? "e-" : "e");
+        pti_append_integer(text, sizeof text, (uint64_t)(e < 0 ? -e : e));
+    } else if (e < 0) { /* 0.000ddd */
+        pti_append(text, sizeof text, "0.");
+        for (i = -1; i > e; i--) pti_append(text, sizeof text, "0");
+        pti_append_integer(text, sizeof text, m);
+    } else { /* ddd.ddd */
+        for (i = digits; i <= e; i++) m *= 10;
+        pti_append_integer(text, sizeof text, m);
+        if (digits > e + 1) {
+            memmove(text + e + 2, text + e + 1, (size_t)(digits - e));
+            text[e + 1] = '.';
+        }
+    }
+    pti_append(buffer, size, text);
+}
+
+/* --- scene --- */
+
+/* Keeps the first error: "<item> <number>: <what>". Returns -1 for the pt_add_x. */
+static int pti_scene_fail(pt_scene *scene, pt_result result, const char *item, uint32_t number, const char *what)
+{
+    if (scene->error != PT_OK) return -1;
+    scene->error = result;
+    scene->error_text[0] = 0;
+    pti_append(scene->error_text, sizeof scene->error_text, item);
+    pti_append(scene->error_text, sizeof scene->error_text, " ");
+    pti_append_integer(scene->error_text, sizeof scene->error_text, number);
+    pti_append(scene->error_text, sizeof scene->error_text, ": ");
+    pti_append(scene->error_text, sizeof scene->error_text, what);
+    return -1;
+}
+
+/* The same about a value: "<item> <number>: <name> <value> <what>". */
+static int pti_scene_fail_value(pt_scene *scene, const char *item, uint32_t number, const char *name, double value,
+                                const char *what)
+{
+    char text[120] = "";
+    pti_append(text, sizeof text, name);
+    pti_append(text, sizeof text, " ");
+    pti_append_real(text, sizeof text, value);
+    pti_append(text, sizeof text, " ");
+    pti_append(text, sizeof text, what);
+    return pti_scene_fail(scene, PT_ERROR_SCENE, item, number, text);
+}
+
+static int pti_scene_no_memory(pt_scene *scene, const char *item, uint32_t number)
+{
+    return pti_scene_fail(scene, PT_ERROR_MEMORY, item, number, "out of memory");
+}
+
+/* Appends one element to an array of the scene; its index, or -1. */
+#define PTI_PUSH(scene, item, array, number, capacity, value) \
+    (pti_reserve((void **)&(scene)->array, &(scene)->capacity, (size_t)(scene)->number + 1, sizeof *(scene)->array, \
+                 (scene)->alloc_user) \
+         ? ((scene)->array[(scene)->number] = (value), (scene)->committed = 0, (int)(scene)->number++) \
+         : pti_scene_no_memory(scene, item, (scene)->number))
+
+/* The value that is out of range in v, or 0 and *bad = 0. */
+static int pti_coordinate_bad(pt_vec3 v, double *bad)
+{
+    double c[3];
+    int k;
+    c[0] = (double)v.x; c[1] = (double)v.y; c[2] = (double)v.z;
+    for (k = 0; k < 3; k++)
+        if (!(fabs(c[k]) <= PT_MAX_COORDINATE)) {
+            *bad = c[k];
+            return 1;
+        }
+    return 0;
+}
+
+static int pti_check_coordinates(pt_scene *scene, const char *item, uint32_t number, const pt_vec3 *v, uint32_t count)
+{
+    double bad;
+    uint32_t i;
+    for (i = 0; i < count; i++)
+        if (pti_coordinate_bad(v[i], &bad)) {
+            pti_scene_fail_value(scene, item, number, "coordinate", bad, "is not finite or beyond 1e18");
+            return 0;
+        }
+    return 1;
+}
+
+static int pti_check_material_id(pt_scene *scene, const char *item, uint32_t number, int material)
+{
+    if (material >= 0 && (uint32_t)material < scene->material_count) return 1;
+    pti_scene_fail_value(scene, item, number, "material", (double)material, "does not exist");
+    return 0;
+}
+
+/* Each band in [0, max]. */
+static int pti_check_rgb(pt_scene *scene, const char *item, uint32_t number, const char *name, pt_rgb c, double max)
+{
+    double v[3];
+    int k;
+    v[0] = (double)c.r; v[1] = (double)c.g; v[2] = (double)c.b;
+    for (k = 0; k < 3; k++)
+        if (!(v[k] >= 0 && v[k] <= max) || !pti_finite(v[k])) {
+            pti_scene_fail_value(scene, item, number, name, v[k], max > 1 ? "is negative or not finite" : "is outside [0,1]");
+            return 0;
+        }
+    return 1;
+}
+
+PTDEF int pt_add_material(pt_scene *scene, pt_material material)
+{
+    uint32_t n = scene->material_count;
+    if ((int)material.kind < 0 || material.kind > PT_MATERIAL_DIELECTRIC)
+        return pti_scene_fail_value(scene, "material", n, "kind", (double)material.kind, "is unknown");
+    if (!pti_check_rgb(scene, "material", n, "albedo", material.albedo, 1)) return -1;
+    if (!pti_check_rgb(scene, "material", n, "emission", material.emission, HUGE_VAL)) return -1;
+    if (!(material.ior >= 0) || !pti_finite((double)material.ior))
+        return pti_scene_fail_value(scene, "material", n, "ior", (double)material.ior, "is negative or not finite");
+    if (material.medium_inside != 0 || material.medium_outside != 0)
+        return pti_scene_fail(scene, PT_ERROR_LEFT_OUT, "material", n, "media need a volumetric method");
+    return PTI_PUSH(scene, "material", materials, material_count, material_capacity, material);
+}
+
+PTDEF int pt_add_mesh(pt_scene *scene, const pt_vec3 *positions, const pt_vec3 *normals, const pt_vec2 *uvs,
+                      uint32_t vertex_count, const uint32_t *indices, uint32_t triangle_count, int material)
+{
+    uint32_t n = scene->mesh_count, base = scene->position_count, i;
+    void *user = scene->alloc_user;
+    pt_mesh mesh;
+    if ((!positions && vertex_count) || (!indices && triangle_count))
+        return pti_scene_fail(scene, PT_ERROR_ARGUMENT, "mesh", n, "positions or indices are NULL");
+    if (!pti_check_material_id(scene, "mesh", n, material)) return -1;
+    if (!pti_check_coordinates(scene, "mesh", n, positions, vertex_count)) return -1;
+    if (normals && !pti_check_coordinates(scene, "mesh", n, normals, vertex_count)) return -1;
+    for (i = 0; uvs && i < vertex_count; i++)
+        if (!pti_finite((double)uvs[i].x) || !pti_finite((double)uvs[i].y))
+            return pti_scene_fail(scene, PT_ERROR_SCENE, "mesh", n, "a texture coordinate is not finite");
+    for (i = 0; i / 3 < triangle_count; i++)
+        if (indices[i] >= vertex_count)
+            return pti_scene_fail_value(scene, "mesh", n, "index", (double)indices[i], "is beyond the vertices");
+    if (vertex_count > 0x7fffffffu - base || triangle_count > 0x7fffffffu - scene->triangle_count ||
+        !pti_reserve((void **)&scene->positions, &scene->position_capacity, (size_t)base + vertex_count, sizeof *positions, user) ||
+        !pti_reserve((void **)&scene->triangles, &scene->triangle_capacity, (size_t)scene->triangle_count + triangle_count,
+                     sizeof *scene->triangles, user) ||
+        (normals && !pti_reserve((void **)&scene->normals, &scene->normal_capacity, (size_t)scene->normal_count + vertex_count,
+                                 sizeof *normals, user)) ||
+        (uvs && !pti_reserve((void **)&scene->uvs, &scene->uv_capacity, (size_t)scene->uv_count + vertex_count, sizeof *uvs, user)))
+        return pti_scene_no_memory(scene, "mesh", n);
+    mesh.has_normals = normals != NULL;
+    mesh.has_uvs = uvs != NULL;
+    mesh.normal_offset = (int64_t)scene->normal_count - base;
+    mesh.uv_offset = (int64_t)scene->uv_count - base;
+    if (PTI_PUSH(scene, "mesh", meshes, mesh_count, mesh_capacity, mesh) < 0) return -1;
+    for (i = 0; i < vertex_count; i++) {
+        scene->positions[scene->position_count++] = positions[i];
+        if (normals) scene->normals[scene->normal_count++] = normals[i];
+        if (uvs) scene->uvs[scene->uv_count++] = uvs[i];
+    }
+    for (i = 0; i < triangle_count; i++) {
+        pt_triangle *t = &scene->triangles[scene->triangle_count++];
+        t->v[0] = base + indices[3 * (size_t)i];
+        t->v[1] = base + indices[3 * (size_t)i + 1];
+        t->v[2] = base + indices[3 * (size_t)i + 2];
+        t->material = material;
+        t->mesh = (int)n;
+    }
+    return (int)n;
+}
+
+PTDEF int pt_add_triangle(pt_scene *scene, pt_vec3 v0, pt_vec3 v1, pt_vec3 v2, int material)
+{
+    static const uint32_t indices[3] = {0, 1, 2};
+    pt_vec3 v[3];
+    int id = (int)scene->triangle_count;
+    v[0] = v0; v[1] = v1; v[2] = v2;
+    return pt_add_mesh(scene, v, NULL, NULL, 3, indices, 1, material) < 0 ? -1 : id;
+}
+
+PTDEF int pt_add_quad(pt_scene *scene, pt_vec3 v0, pt_vec3 v1, pt_vec3 v2, pt_vec3 v3, int material)
+{
+    static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
+    pt_vec3 v[4];
+    int id = (int)scene->triangle_count;
+    v[0] = v0; v[1] = v1; v[2] = v2; v[3] = v3;
+    return pt_add_mesh(scene, v, NULL, NULL, 4, indices, 2, material) < 0 ? -1 : id;
+}
+
+PTDEF int pt_add_parallelogram(pt_scene *scene, pt_vec3 corner, pt_vec3 edge1, pt_vec3 edge2, int material)
+{
+    uint32_t n = scene->parallelogram_count;
+    pt_parallelogram p;
+    pt_vec3 v[3];
+    v[0] = p.corner = corner;
+    v[1] = p.edge1 = edge1;
+    v[2] = p.edge2 = edge2;
+    p.material = material;
+    if (!pti_check_coordinates(scene, "parallelogram", n, v, 3)) return -1;
+    if (!pti_check_material_id(scene, "parallelogram", n, material)) return -1;
+    return PTI_PUSH(scene, "parallelogram", parallelograms, parallelogram_count, parallelogram_capacity, p);
+}
+
+PTDEF int pt_add_sphere(pt_scene *scene, pt_vec3 centre, pt_real radius, int material)
+{
+    uint32_t n = scene->sphere_count;
+    pt_sphere s;
+    s.centre = centre;
+    s.radius = radius;
+    s.material = material;
+    if (!pti_check_coordinates(scene, "sphere", n, &centre, 1)) return -1;
+    if (!(radius > 0 && (double)radius <= PT_MAX_COORDINATE))
+        return pti_scene_fail_value(scene, "sphere", n, "radius", (double)radius, "is not in (0, 1e18]");
+    if (!pti_check_material_id(scene, "sphere", n, material)) return -1;
+    return PTI_PUSH(scene, "sphere", spheres, sphere_count, sphere_capacity, s);
+}
+
+PTDEF int pt_add_point_light(pt_scene *scene, pt_vec3 position, pt_rgb intensity)
+{
+    uint32_t n = scene->point_light_count;
+    pt_point_light l;
+    l.position = position;
+    l.intensity = intensity;
+    if (!pti_check_coordinates(scene, "point light", n, &position, 1)) return -1;
+    if (!pti_check_rgb(scene, "point light", n, "intensity", intensity, HUGE_VAL)) return -1;
+    return PTI_PUSH(scene, "point light", point_lights, point_light_count, point_light_capacity, l);
+}
+
+#if PTI_HAS_ENVIRONMENT
+PTDEF int pt_set_environment(pt_scene *scene, pt_rgb radiance)
+{
+    if (!pti_check_rgb(scene, "environment", 0, "radiance", radiance, HUGE_VAL)) return -1;
+    scene->environment = radiance;
+    scene->committed = 0;
+    return 0;
+}
+#endif
+
+/* Box of one primitive of the committed scene, rounded outwards; area for lights. */
+static void pti_primitive_box(const pt_scene *scene, const pt_primitive *p, pt_vec3 *lo, pt_vec3 *hi, double *area)
+{
+    pti_bounds b = pti_bounds_empty();
+    pt_vec3 v[4];
+    int k, corners = 4;
+    if (p->shape == PT_SHAPE_SPHERE) {
+        const pt_sphere *s = &scene->spheres[p->index];
+        pt_vec3 c = s->centre;
+        pt_real r = s->radius;
+        *lo = pt_v3(pti_next(c.x - r, 0), pti_next(c.y - r, 0), pti_next(c.z - r, 0));
+        *hi = pt_v3(pti_next(c.x + r, 1), pti_next(c.y + r, 1), pti_next(c.z + r, 1));
+        *area = 4 * PT_PI * (double)r * (double)r;
+        return;
+    }
+    if (p->shape == PT_SHAPE_TRIANGLE) {
+        const pt_triangle *s = &scene->triangles[p->index];
+        for (corners = 0; corners < 3; corners++) v[corners] = scene->positions[s->v[corners]];
+    } else {
+        pti_parallelogram_corners(&scene->parallelograms[p->index], v);
+    }
+    for (k = 0; k < corners; k++) pti_bounds_add(&b, v[k], v[k]);
+    *lo = pt_v3((pt_real)b.lo[0], (pt_real)b.lo[1], (pt_real)b.lo[2]);
+    *hi = pt_v3((pt_real)b.hi[0], (pt_real)b.hi[1], (pt_real)b.hi[2]);
+    *area = pti_d_length(pti_d_cross(pti_d_between(v[0], v[1]), pti_d_between(v[0], v[corners - 1])));
+    if (corners == 3) *area /= 2;
+}
+
+static int pti_primitive_material(const pt_scene *scene, const pt_primitive *p)
+{
+    return p->shape == PT_SHAPE_TRIANGLE        ? scene->triangles[p->index].material
+           : p->shape == PT_SHAPE_PARALLELOGRAM ? scene->parallelograms[p->index].material
+                                                : scene->spheres[p->index].material;
+}
+
+static void pti_add_primitive(pt_scene *scene, pt_shape shape, uint32_t index)
+{
+    pt_primitive *p = &scene->primitives[scene->primitive_count++];
+    p->shape = shape;
+    p->index = index;
+    p->light = -1;
+}
+
+/* The list of all primitives that can be hit. */
+static int pti_commit_primitives(pt_scene *scene)
+{
+    size_t count = (size_t)scene->triangle_count + scene->parallelogram_count + scene->sphere_count;
+    uint32_t i;
+    if (count > 0x7fffffffu) return 0;
+    scene->primitives = (pt_primitive *)pti_alloc(count, sizeof *scene->primitives, scene->alloc_user);
+    if (!scene->primitives) return 0;
+    for (i = 0; i < scene->triangle_count; i++) {
+        const uint32_t *v = scene->triangles[i].v;
+        const pt_vec3 *p = scene->positions;
+        if (pti_triangle_has_area(p[v[0]], p[v[1]], p[v[2]])) pti_add_primitive(scene, PT_SHAPE_TRIANGLE, i);
+        else scene->degenerate_count++;
+    }
+    for (i = 0; i < scene->parallelogram_count; i++) {
+        pt_vec3 v[4];
+        pti_parallelogram_corners(&scene->parallelograms[i], v);
+        if (pti_triangle_has_area(v[0], v[1], v[2]) && pti_triangle_has_area(v[0], v[2], v[3]))
+            pti_add_primitive(scene, PT_SHAPE_PARALLELOGRAM, i);
+        else scene->degenerate_count++;
+    }
+    for (i = 0; i < scene->sphere_count; i++) pti_add_primitive(scene, PT_SHAPE_SPHERE, i);
+    return 1;
+}
+
+/* Boxes, bounds and the tree. */
+static int pti_commit_tree(pt_scene *scene)
+{
+    uint32_t n = scene->primitive_count, i;
+    pt_vec3 *boxes = (pt_vec3 *)pti_alloc(2 * (size_t)n, sizeof *boxes, scene->alloc_user);
+    pti_bounds all = pti_bounds_empty();
+    double area;
+    int ok = boxes != NULL;
+    for (i = 0; ok && i < n; i++) {
+        pti_primitive_box(scene, &scene->primitives[i], &boxes[i], &boxes[n + i], &area);
+        pti_bounds_add(&all, boxes[i], boxes[n + i]);
+    }
+    if (n > 0) {
+        scene->lo = pt_v3((pt_real)all.lo[0], (pt_real)all.lo[1], (pt_real)all.lo[2]);
+        scene->hi = pt_v3((pt_real)all.hi[0], (pt_real)all.hi[1], (pt_real)all.hi[2]);
+    }
+#if PTI_HAS_BVH
+    if (ok && n > PTI_LINEAR_MAX) ok = pt_bvh_build(&scene->bvh, boxes, boxes + n, n, scene->alloc_user) == PT_OK;
+#endif
+    pti_free(boxes, scene->alloc_user);
+    return ok;
+}
+
+/* Power of a light for its share of the samples: pi A L seen from one side, 4 pi I, pi L times the area of the
+   sphere around the scene. */
+static double pti_light_power(const pt_scene *scene, const pt_light *l)
+{
+    double r = pti_scene_radius(scene);
+    double mean = ((double)l->emission.r + (double)l->emission.g + (double)l->emission.b) / 3;
+    if (l->kind == PT_LIGHT_AREA) return PT_PI * l->area * mean;
+    if (l->kind == PT_LIGHT_POINT) return 4 * PT_PI * mean;
+    return PT_PI * mean * 4 * PT_PI * r * r;
+}
+
+static void pti_collect_lights(pt_scene *scene)
+{
+    uint32_t i;
+    pt_light l;
+    for (i = 0; i < scene->primitive_count; i++) {
+        pt_primitive *p = &scene->primitives[i];
+        pt_vec3 lo, hi;
+        memset(&l, 0, sizeof l);
+        l.emission = scene->materials[pti_primitive_material(scene, p)].emission;
+        if (pti_rgb_black(l.emission)) continue;
+        l.primitive = (int)i;
+        pti_primitive_box(scene, p, &lo, &hi, &l.area);
+        p->light = (int)scene->light_count;
+        scene->lights[scene->light_count++] = l;
+    }
+    for (i = 0; i < scene->point_light_count; i++) {
+        memset(&l, 0, sizeof l);
+        l.kind = PT_LIGHT_POINT;
+        l.primitive = -1;
+        l.position = scene->point_lights[i].position;
+        l.emission = scene->point_lights[i].intensity;
+        if (!pti_rgb_black(l.emission)) scene->lights[scene->light_count++] = l;
+    }
+    if (!pti_rgb_black(scene->environment)) {
+        memset(&l, 0, sizeof l);
+        l.kind = PT_LIGHT_ENVIRONMENT;
+        l.primitive = -1;
+        l.emission = scene->environment;
+        scene->environment_light = (int)scene->light_count;
+        scene->lights[scene->light_count++] = l;
+    }
+}
+
+static int pti_commit_lights(pt_scene *scene)
+{
+    size_t most = (size_t)scene->primitive_count + scene->point_light_count + 1;
+    double *power;
+    uint32_t i;
+    int ok;
+    scene->lights = (pt_light *)pti_alloc(most, sizeof *scene->lights, scene->alloc_user);
+    power = (double *)pti_alloc(most, sizeof *power, scene->alloc_user);
+    ok = scene->lights && power;
+    if (ok) {
+        pti_collect_lights(scene);
+        for (i = 0; i < scene->light_count; i++) power[i] = pti_light_power(scene, &scene->lights[i]);
+        ok = pt_alias_make(&scene->light_table, power, scene->light_count, scene->alloc_user) == PT_OK;
+        for (i = 0; ok && i < scene->light_table.count; i++) scene->lights[i].pmf = scene->light_table.entries[i].pmf;
+    }
+    pti_free(power, scene->alloc_user);
+    return ok;
+}
+
+static unsigned pti_find_needs(const pt_scene *scene)
+{
+    static const unsigned shapes[3] = {PT_NEEDS_TRIANGLES, PT_NEEDS_PARALLELOGRAMS, PT_NEEDS_SPHERES};
+    static const unsigned kinds[3] = {PT_NEEDS_DIFFUSE, PT_NEEDS_MIRROR, PT_NEEDS_DIELECTRIC};
+    static const unsigned lights[3] = {PT_NEEDS_AREA_LIGHTS, PT_NEEDS_POINT_LIGHTS, PT_NEEDS_ENVIRONMENT};
+    unsigned needs = 0;
+    uint32_t i;
+    for (i = 0; i < scene->primitive_count; i++) {
+        const pt_primitive *p = &scene->primitives[i];
+        needs |= shapes[p->shape] | kinds[scene->materials[pti_primitive_material(scene, p)].kind];
+        if (p->shape == PT_SHAPE_TRIANGLE) {
+            const pt_mesh *mesh = &scene->meshes[scene->triangles[p->index].mesh];
+            if (mesh->has_normals) needs |= PT_NEEDS_SHADING_NORMALS;
+            if (mesh->has_uvs) needs |= PT_NEEDS_UVS;
+        }
+    }
+    for (i = 0; i < scene->light_count; i++) needs |= lights[scene->lights[i].kind];
+#if PTI_HAS_BVH
+    if (scene->bvh.node_count > 0) needs |= PT_NEEDS_BVH;
+#endif
+    return needs;
+}
+
+/* Frees what pt_commit made. */
+static void pti_uncommit(pt_scene *scene)
+{
+    pti_free(scene->primitives, scene->alloc_user);
+    pti_free(scene->lights, scene->alloc_user);
+    pt_alias_free(&scene->light_table, scene->alloc_user);
+#if PTI_HAS_BVH
+    pt_bvh_free(&scene->bvh, scene->alloc_user);
+#endif
+    scene->primitives = NULL;
+    scene->lights = NULL;
+    scene->primitive_count = scene->light_count = scene->degenerate_count = 0;
+    scene->environment_light = -1;
+    scene->lo = scene->hi = pt_v3(0, 0, 0);
+    scene->needs = 0;
+    scene->committed = 0;
+}
+
+PTDEF pt_result pt_commit(pt_scene *scene)
+{
+    if (scene->error != PT_OK) return scene->error;
+    pti_uncommit(scene);
+    if (!pti_commit_primitives(scene) || !pti_commit_tree(scene) || !pti_commit_lights(scene)) {
+        pti_uncommit(scene);
+        pti_scene_no_memory(scene, "commit of primitives, number", 0);
+        return scene->error;
+    }
+    scene->needs = pti_find_needs(scene);
+    scene->committed = 1;
+    return PT_OK;
+}
+
+PTDEF const char *pt_scene_error(const pt_scene *scene)
+{
+    return scene->error == PT_OK ? pt_result_string(PT_OK) : scene->error_text;
+}
+
+PTDEF unsigned pt_scene_needs(const pt_scene *scene)
+{
+    return scene->needs;
+}
+
+PTDEF const char *pt_scene_needs_string(const pt_scene *scene, char *buffer, size_t size)
+{
+    static const char *const names[12] = {"triangles", "parallelograms", "spheres", "shading normals",
+        "texture coordinates", "diffuse", "mirror", "dielectric", "area lights", "point lights", "environment", "tree"};
+    int i;
+    if (size == 0) return "";
+    buffer[0] = 0;
+    for (i = 0; i < 12; i++)
+        if (scene->needs & (1u << i)) {
+            if (buffer[0]) pti_append(buffer, size, ", ");
+            pti_append(buffer, size, names[i]);
+        }
+    return buffer;
+}
+
+PTDEF void pt_scene_free(pt_scene *scene)
+{
+    void *user = scene->alloc_user;
+    pti_uncommit(scene);
+    pti_free(scene->materials, user);
+    pti_free(scene->positions, user);
+    pti_free(scene->normals, user);
+    pti_free(scene->uvs, user);
+    pti_free(scene->triangles, user);
+    pti_free(scene->meshes, user);
+    pti_free(scene->spheres, user);
+    pti_free(scene->parallelograms, user);
+    pti_free(scene->point_lights, user);
+    memset(scene, 0, sizeof *scene);
+    scene->alloc_user = user;
+}
+
+PTDEF int pt_intersect(const pt_scene *scene, const pt_ray *ray, pt_hit *hit)
+{
+    pti_ray r = pti_ray_make(ray);
+    pti_best best;
+    if (!pti_search(scene, &r, (double)ray->tmax, &best, 0)) return 0;
+    pti_fill(scene, &r, &best, hit);
+    return 1;
+}
+
+PTDEF int pt_occluded(const pt_scene *scene, const pt_ray *ray)
+{
+    pti_ray r = pti_ray_make(ray);
+    pti_best best;
+    return pti_search(scene, &r, (double)ray->tmax, &best, 1);
+}
+
+/* --- camera --- */
+
+PTDEF pt_camera pt_camera_look_at(pt_vec3 eye, pt_vec3 target, pt_vec3 up, pt_real vfov_deg)
+{
+    pt_camera c;
+    pti_d3 forward = pti_d_normalize(pti_d_between(eye, target)), right, upward;
+    double bad;
+    memset(&c, 0, sizeof c);
+    right = pti_d_normalize(pti_d_cross(forward, pti_d_normalize(pti_d_from(up))));
+    upward = pti_d_cross(right, forward);
+    if (pti_coordinate_bad(eye, &bad) || pti_coordinate_bad(target, &bad)) return c;
+    if (!(pti_d_length(upward) > 0.5) || !(vfov_deg > 0 && vfov_deg < 180)) return c;
+    c.position = eye;
+    c.forward = pti_d_to(forward);
+    c.right = pti_d_to(right);
+    c.up = pti_d_to(upward);
+    c.tan_half = (pt_real)tan((double)vfov_deg * (PT_PI / 360));
+    c.focus_distance = 1;
+    return c;
+}
+
+PTI_INLINE pt_real pti_focus(const pt_camera *c)
+{
+    return c->focus_distance > 0 ? c->focus_distance : PTI_R(1);
+}
+
+/* A point of the lens. */
+PTI_INLINE pt_vec3 pti_lens_point(const pt_camera *c, pt_vec2 lens)
+{
+    pt_vec2 d;
+    if (!(c->lens_radius > 0)) return c->position;
+    d = pt_warp_disk(lens);
+    return pt_v3_add(c->position, pt_v3_add(pt_v3_scale(c->right, d.x * c->lens_radius), pt_v3_scale(c->up, d.y * c->lens_radius)));
+}
+
+PTDEF pt_ray pt_camera_ray(const pt_camera *c, pt_real aspect, pt_real x, pt_real y, pt_vec2 lens)
+{
+    pt_vec3 d = pt_v3_add(c->forward, pt_v3_add(pt_v3_scale(c->right, (2 * x - 1) * c->tan_half * aspect),
+                                                pt_v3_scale(c->up, (1 - 2 * y) * c->tan_half)));
+    pt_ray ray;
+    ray.o = pti_lens_point(c, lens);
+    ray.tmax = PTI_REAL_MAX;
+    if (c->lens_radius > 0) /* all rays of an image point meet in the plane in focus */
+        d = pt_v3_sub(pt_v3_add(c->position, pt_v3_scale(d, pti_focus(c))), ray.o);
+    ray.d = pt_v3_normalize(d);
+    if (c->near_distance > 0)
+        ray.o = pt_v3_add(ray.o, pt_v3_scale(ray.d, c->near_distance / pt_v3_dot(ray.d, c->forward)));
+    return ray;
+}
+
+/* Area of the image in a plane at distance 1, and of the lens (1 stands for a pinhole). */
+static double pti_image_area(const pt_camera *c, pt_real aspect)
+{
+    return 4 * (double)c->tan_half * (double)c->tan_half * (double)aspect;
+}
+static double pti_lens_area(const pt_camera *c)
+{
+    return c->lens_radius > 0 ? PT_PI * (double)c->lens_radius * (double)c->lens_radius : 1;
+}
+
+PTDEF int pt_camera_we(const pt_camera *c, pt_real aspect, pt_vec3 p, pt_vec2 lens, pt_camera_we_result *out)
+{
+    pti_d3 d, to, forward = pti_d_from(c->forward);
+    double z, cos_lens, distance, tan_half = (double)c->tan_half, focus = (double)pti_focus(c), x, y;
+    out->lens = pti_lens_point(c, lens);
+    d = pti_d_between(out->lens, p);
+    z = pti_d_dot(d, forward);
+    if (!(z > (double)c->near_distance)) return 0;
+    distance = pti_d_length(d);
+    cos_lens = z / distance;
+    /* where this ray crosses the plane in focus, relative to the centre of the lens */
+    to = pti_d_add(pti_d_between(c->position, out->lens), pti_d_scale(d, focus / z));
+    x = pti_d_dot(to, pti_d_from(c->right)) / (focus * tan_half * (double)aspect);
+    y = pti_d_dot(to, pti_d_from(c->up)) / (focus * tan_half);
+    if (!(fabs(x) < 1 && fabs(y) < 1)) return 0;
+    out->x = (pt_real)(0.5 + 0.5 * x);
+    out->y = (pt_real)(0.5 - 0.5 * y);
+    out->wi = pti_d_to(pti_d_scale(d, -1 / distance));
+    out->distance = distance;
+    out->cos_lens = cos_lens;
+    out->we = 1 / (pti_image_area(c, aspect) * pti_lens_area(c) * cos_lens * cos_lens * cos_lens * cos_lens);
+    out->pdf_w = distance * distance / (pti_lens_area(c) * cos_lens);
+    return 1;
+}
+
+PTDEF void pt_camera_pdf(const pt_camera *c, pt_real aspect, pt_vec3 direction, double *pdf_a, double *pdf_w)
+{
+    double cos_lens = (double)pt_v3_dot(direction, c->forward);
+    *pdf_a = 1 / pti_lens_area(c);
+    *pdf_w = cos_lens > 0 ? 1 / (pti_image_area(c, aspect) * cos_lens * cos_lens * cos_lens) : 0;
+}
+
+/* --- film --- */
+
+PTDEF void pt_film_free(pt_film *film)
+{
+    void *user = film->alloc_user;
+    int h;
+    for (h = 0; h < 2; h++) {
+        pti_free(film->half[h], user);
+        pti_free(film->splat[h], user);
+    }
+    pti_free(film->albedo, user);
+    pti_free(film->normal, user);
+    pti_free(film->depth, user);
+    pti_free(film->ranges, user);
+    memset(film, 0, sizeof *film);
+    film->alloc_user = user;
+}
+
+PTDEF pt_result pt_film_make(pt_film *film, int width, int height, int aov)
+{
+    size_t n;
+    pt_film_free(film);
+    if (width < 1 || height < 1 || width > 65536 || height > 65536) return PT_ERROR_ARGUMENT;
+    n = (size_t)width * (size_t)height;
+    if (n > SIZE_MAX / (6 * sizeof(double))) return PT_ERROR_MEMORY;
+    film->half[0] = (double *)pti_alloc_zero(3 * n, sizeof(double), film->alloc_user);
+    film->half[1] = (double *)pti_alloc_zero(3 * n, sizeof(double), film->alloc_user);
+    if (aov) {
+        film->albedo = (double *)pti_alloc_zero(3 * n, sizeof(double), film->alloc_user);
+        film->normal = (double *)pti_alloc_zero(3 * n, sizeof(double), film->alloc_user);
+        film->depth = (double *)pti_alloc_zero(n, sizeof(double), film->alloc_user);
+    }
+    if (!film->half[0] || !film->half[1] || (aov && (!film->albedo || !film->normal || !film->depth))) {
+        pt_film_free(film);
+        return PT_ERROR_MEMORY;
+    }
+    film->width = width;
+    film->height = height;
+    return PT_OK;
+}
+
+PTDEF uint32_t pt_film_spp(const pt_film *film)
+{
+    return film->samples[0] + film->samples[1];
+}
+
+/* Value k (three a pixel) of half h (0, 1, or 2 for both) as a mean. */
+static double pti_film_value(const pt_film *film, int h, size_t k)
+{
+    double sum = 0, n = 0;
+    int i;
+    for (i = 0; i < 2; i++) {
+        if (h != 2 && h != i) continue;
+        n += film->samples[i];
+        sum += film->half[i][k] + (film->splat[i] ? film->splat[i][k] : 0);
+    }
+    return n > 0 ? sum / n : 0;
+}
+
+PTDEF pt_rgbd pt_film_pixel(const pt_film *film, int x, int y)
+{
+    size_t k = 3 * ((size_t)y * (size_t)film->width + (size_t)x);
+    return pt_rgbd3(pti_film_value(film, 2, k), pti_film_value(film, 2, k + 1), pti_film_value(film, 2, k + 2));
+}
+
+PTDEF pt_result pt_film_add_range(pt_film *film, uint32_t begin, uint32_t end)
+{
+    pt_range *r;
+    uint32_t i, at;
+    if (begin >= end) return PT_ERROR_ARGUMENT;
+    for (at = 0; at < film->range_count && film->ranges[at].end < begin; at++) {}
+    for (i = 0; i < film->range_count; i++)
+        if (begin < film->ranges[i].end && film->ranges[i].begin < end) return PT_ERROR_MISMATCH;
+    if (!pti_reserve((void **)&film->ranges, &film->range_capacity, (size_t)film->range_count + 1, sizeof *film->ranges,
+                     film->alloc_user))
+        return PT_ERROR_MEMORY;
+    r = film->ranges;
+    memmove(r + at + 1, r + at, (film->range_count - at) * sizeof *r);
+    r[at].begin = begin;
+    r[at].end = end;
+    film->range_count++;
+    for (i = 0; i + 1 < film->range_count;) { /* join neighbours */
+        if (r[i].end != r[i + 1].begin) {
+            i++;
+            continue;
+        }
+        r[i].end = r[i + 1].end;
+        film->range_count--;
+        memmove(r + i + 1, r + i + 2, (film->range_count - i - 1) * sizeof *r);
+    }
+    return PT_OK;
+}
+
+static void pti_add_array(double *a, const double *b, size_t n)
+{
+    size_t i;
+    for (i = 0; a && b && i < n; i++) a[i] += b[i];
+}
+
+/* Makes the splat layer of one half. */
+static int pti_film_need_splat(pt_film *film, int h)
+{
+    size_t n = 3 * (size_t)film->width * (size_t)film->height;
+    if (!film->splat[h]) film->splat[h] = (double *)pti_alloc_zero(n, sizeof(double), film->alloc_user);
+    return film->splat[h] != NULL;
+}
+
+PTDEF pt_result pt_film_merge(pt_film *a, const pt_film *b)
+{
+    size_t n = (size_t)a->width * (size_t)a->height;
+    pt_film ranges = PT_FILM_INIT; /* only its ranges are used: tried before anything is changed */
+    pt_result result = PT_OK;
+    uint32_t i;
+    int h;
+    if (a->width != b->width || a->height != b->height || a->fingerprint != b->fingerprint) return PT_ERROR_MISMATCH;
+    if ((a->albedo != NULL) != (b->albedo != NULL)) return PT_ERROR_MISMATCH;
+    ranges.alloc_user = a->alloc_user;
+    for (i = 0; i < a->range_count && result == PT_OK; i++) result = pt_film_add_range(&ranges, a->ranges[i].begin, a->ranges[i].end);
+    for (i = 0; i < b->range_count && result == PT_OK; i++) result = pt_film_add_range(&ranges, b->ranges[i].begin, b->ranges[i].end);
+    for (h = 0; h < 2; h++)
+        if (result == PT_OK && b->splat[h] && !pti_film_need_splat(a, h)) result = PT_ERROR_MEMORY;
+    if (result != PT_OK) {
+        pti_free(ranges.ranges, a->alloc_user);
+        return result;
+    }
+    pti_free(a->ranges, a->alloc_user);
+    a->ranges = ranges.ranges;
+    a->range_count = ranges.range_count;
+    a->range_capacity = ranges.range_capacity;
+    for (h = 0; h < 2; h++) {
+        pti_add_array(a->half[h], b->half[h], 3 * n);
+        pti_add_array(a->splat[h], b->splat[h], 3 * n);
+        a->samples[h] += b->samples[h];
+    }
+    pti_add_array(a->albedo, b->albedo, 3 * n);
+    pti_add_array(a->normal, b->normal, 3 * n);
+    pti_add_array(a->depth, b->depth, n);
+    a->nonfinite += b->nonfinite;
+    return PT_OK;
+}
+
+PTDEF pt_result pt_splat_add(pt_splat_list *list, uint32_t pixel, uint32_t half, pt_rgb value)
+{
+    if (list->count == list->capacity) {
+        size_t wanted = list->capacity + list->capacity / 2 + 64;
+        void *p = wanted > SIZE_MAX / sizeof *list->items ? NULL : PT_REALLOC(list->items, wanted * sizeof *list->items, list->alloc_user);
+        if (!p) return PT_ERROR_MEMORY;
+        list->items = (pt_splat *)p;
+        list->capacity = wanted;
+    }
+    list->items[list->count].pixel = pixel;
+    list->items[list->count].half = half;
+    list->items[list->count++].value = value;
+    return PT_OK;
+}
+
+PTDEF pt_result pt_film_add_splats(pt_film *film, const pt_splat_list *list)
+{
+    size_t pixels = (size_t)film->width * (size_t)film->height, i;
+    for (i = 0; i < list->count; i++) {
+        const pt_splat *s = &list->items[i];
+        double *sum;
+        if (s->pixel >= pixels || s->half > 1) return PT_ERROR_ARGUMENT;
+        if (!pti_film_need_splat(film, (int)s->half)) return PT_ERROR_MEMORY;
+        if (!pti_rgb_finite(s->value)) {
+            film->nonfinite++;
+            continue;
+        }
+        sum = film->splat[s->half] + 3 * (size_t)s->pixel;
+        sum[0] += (double)s->value.r;
+        sum[1] += (double)s->value.g;
+        sum[2] += (double)s->value.b;
+    }
+    return PT_OK;
+}
+
+PTDEF void pt_splat_list_free(pt_splat_list *list)
+{
+    void *user = list->alloc_user;
+    pti_free(list->items, user);
+    memset(list, 0, sizeof *list);
+    list->alloc_user = user;
+}
+
+/* Sums of squared errors as they are collected over pixels and bands. */
+typedef struct pti_error_sums {
+    double square, relative, relative_001, n;
+} pti_error_sums;
+
+static void pti_error_add(pti_error_sums *s, double square, double reference, double floor2)
+{
+    double r2 = reference * reference;
+    s->square += square;
+    if (square > 0) s->relative += square / (r2 + floor2);
+    s->relative_001 += square / (r2 + 0.01);
+    s->n += 1;
+}
+
+static void pti_error_finish(const pti_error_sums *s, pt_error *out)
+{
+    out->rmse = sqrt(s->square / s->n);
+    out->relmse = s->relative / s->n;
+    out->relmse_001 = s->relative_001 / s->n;
+}
+
+/* (0.1 * mean luminance)^2 of the film itself. */
+static double pti_film_floor(const pt_film *film)
+{
+    size_t n = (size_t)film->width * (size_t)film->height, i;
+    double sum = 0;
+    for (i = 0; i < n; i++)
+        sum += pt_luminance(pti_film_value(film, 2, 3 * i), pti_film_value(film, 2, 3 * i + 1), pti_film_value(film, 2, 3 * i + 2));
+    return 0.01 * (sum / (double)n) * (sum / (double)n);
+}
+
+PTDEF int pt_film_error_estimate(const pt_film *film, pt_error *out)
+{
+    size_t n = 3 * (size_t)film->width * (size_t)film->height, k;
+    double a = film->samples[0], b = film->samples[1], share, floor2;
+    pti_error_sums sums;
+    memset(&sums, 0, sizeof sums);
+    memset(out, 0, sizeof *out);
+    if (!(a > 0 && b > 0)) return 0;
+    share = a * b / ((a + b) * (a + b));
+    floor2 = pti_film_floor(film);
+    for (k = 0; k < n; k++) {
+        double d = pti_film_value(film, 0, k) - pti_film_value(film, 1, k);
+        pti_error_add(&sums, share * d * d, pti_film_value(film, 2, k), floor2);
+    }
+    pti_error_finish(&sums, out);
+    return 1;
+}
+
+PTDEF void pt_film_error(const pt_film *film, const float *reference, pt_error *out)
+{
+    size_t n = (size_t)film->width * (size_t)film->height, k;
+    double mean = 0;
+    pti_error_sums sums;
+    memset(&sums, 0, sizeof sums);
+    for (k = 0; k < n; k++)
+        mean += pt_luminance((double)reference[3 * k], (double)reference[3 * k + 1], (double)reference[3 * k + 2]) / (double)n;
+    for (k = 0; k < 3 * n; k++) {
+        double r = (double)reference[k], d = pti_film_value(film, 2, k) - r;
+        pti_error_add(&sums, d * d, r, 0.01 * mean * mean);
+    }
+    pti_error_finish(&sums, out);
+}
+
+/* =====================================================================================================
+   [PT-11] INTEGRATORS: implementation
+   =====================================================================================================
+   The rendering equation [Kaj86]
+
+       L(x, wo) = Le(x, wo) + int f(wo, wi) L(y, -wi) |cos| dwi,      y = what x sees along wi,
+
+   has L on both sides. Put in itself k times, it is a sum over paths of 1, 2, 3, ... edges. Path tracing walks
+   from the eye, one random direction at each surface, and keeps the throughput
+
+       beta = product over the vertices of f |cos| / p,
+
+   so that beta * Le at every emitter met has the expectation of that sum. Three estimators share the walk:
+   plain (light only where the walk hits it), light sampling (at each vertex one point on a light is asked
+   for; hitting it later must then NOT count, or it would count twice), and both, weighted by multiple
+   importance sampling [Vea97] 9.2: w = p^2 / (p^2 + q^2) for the technique with density p against the other.
+   The weight belongs to the emission, not to beta.
+
+   Russian roulette [Arv90] ends the walk without bias: go on with probability q, and divide beta by q. For any
+   q > 0 that depends on the past only the expectation is unchanged. With q = throughput, beta stays near 1
+   after each survival; its variance is finite for every albedo below 1, whereas a cap of q such as 0.95 makes
+   it infinite in a closed scene with albedo above sqrt(0.95). q is at most 1 - 2^-24, so that every walk ends.
+   Refraction scales radiance by 1/eta^2, which is undone again on the way out: roulette ignores that factor.
+
+   The body is written once, with the features a scene may need as a constant mask: pti_path below is compiled
+   for each mask that the driver picks from. */
+
+PTDEF double pt_mis_weight(double p1, double p2, pt_heuristic heuristic)
+{
+    double r;
+    if (!(p1 > 0)) return 0;
+    r = p2 / p1;
+    return heuristic == PT_HEURISTIC_POWER ? 1 / (1 + r * r) : 1 / (1 + r);
+}
+
+enum { PTI_TECHNIQUE_PLAIN, PTI_TECHNIQUE_LIGHT, PTI_TECHNIQUE_MIS };
+
+/* Features that an instance of the integrator may leave out. */
+enum {
+    PTI_WITH_SPECULAR = 1,
+    PTI_WITH_ENVIRONMENT = 2,
+    PTI_WITH_OBSERVER = 4,
+    PTI_WITH_ALL = 7
+};
+
+#if defined(__GNUC__)
+#define PTI_LOAD(p) __atomic_load_n(p, __ATOMIC_RELAXED)
+#define PTI_STORE(p, v) __atomic_store_n(p, v, __ATOMIC_RELAXED)
+#else
+#define PTI_LOAD(p) (*(p))
+#define PTI_STORE(p, v) (*(p) = (v))
+#endif
+
+/* A walk under way. */
+typedef struct pti_walk {
+    const pt_scene *scene;
+    pt_sampler *sampler;
+    const pt_li_options *options;
+    pt_ray ray;
+    pt_hit hit;
+    pt_rgb beta;
+    double eta2;            /* product of eta^2 over the refractions so far                                */
+    pt_rgbd sum;            /* radiance found                                                              */
+    pt_real pdf_w;          /* density of the last direction,                                              */
+    int specular;           /*   1 if it came from a delta lobe (or from the camera)                       */
+    int edges;
+    uint64_t rays;
+#if PTI_HAS_OBSERVER
+    char letters[PT_WORD_MAX];
+#endif
+} pti_walk;
+
+#if PTI_HAS_OBSERVER
+static char pti_letter(unsigned lobe)
+{
+    return lobe == PT_LOBE_DIFFUSE ? 'D' : lobe == PT_LOBE_GLOSSY ? 'G' : 'S';
+}
+
+/* Tells the observer of a contribution over `edges` edges; letters[0..edges-2] lead from the eye. */
+static void pti_observe(const pti_walk *w, int edges, pt_rgbd value)
+{
+    char word[PT_WORD_MAX + 4];
+    int letters = edges - 1, n = 0, i;
+    if (letters > PT_WORD_MAX) {
+        letters = PT_WORD_MAX;
+        word[n++] = '*';
+    } else {
+        word[n++] = 'L';
+    }
+    for (i = letters - 1; i >= 0; i--) word[n++] = w->letters[i];
+    word[n++] = 'E';
+    word[n] = 0;
+    w->options->observer(w->options->observer_user, word, edges, value);
+}
+#endif
+
+/* Adds beta * value * weight. */
+PTI_INLINE void pti_contribute(pti_walk *w, pt_rgb value, double weight, int edges, const unsigned features)
+{
+    pt_rgbd c = pt_rgbd3((double)w->beta.r * (double)value.r * weight, (double)w->beta.g * (double)value.g * weight,
+                         (double)w->beta.b * (double)value.b * weight);
+    w->sum.r += c.r;
+    w->sum.g += c.g;
+    w->sum.b += c.b;
+#if PTI_HAS_OBSERVER
+    if ((features & PTI_WITH_OBSERVER) && w->options->observer) pti_observe(w, edges, c);
+#endif
+    (void)edges;
+    (void)features;
+}
+
+/* Emission that the last direction found: all of it where no other technique could, its share otherwise. */
+PTI_INLINE double pti_emission_weight(const pti_walk *w, int light, const pt_hit *hit, const int technique)
+{
+    double p;
+    if (technique == PTI_TECHNIQUE_PLAIN || w->specular) return 1;
+    if (technique == PTI_TECHNIQUE_LIGHT) return 0;
+    p = w->scene->lights[light].pmf * (double)pt_light_pdf_w(w->scene, light, w->ray.o, hit);
+    return pt_mis_weight((double)w->pdf_w, p, w->options->heuristic);
+}
+
+/* Asks one point of one light for its light at the current vertex. */
+PTI_INLINE void pti_direct(pti_walk *w, const pt_bsdf *bsdf, pt_vec3 wo, const unsigned features, const int technique)
+{
+    uint32_t dimension = PT_DIM_EDGE(w->edges);
+    pt_light_sample_result ls;
+    pt_real pmf, c;
+    pt_vec2 u;
+    pt_rgb f;
+    pt_ray shadow;
+    double p, weight;
+    int light;
+    if ((features & PTI_WITH_SPECULAR) && !(bsdf->lobes & (PT_LOBE_DIFFUSE | PT_LOBE_GLOSSY))) return;
+    pt_sampler_seek(w->sampler, dimension + PT_DIM_LIGHT_CHOICE);
+    light = pt_light_choose(w->scene, pt_sampler_1d(w->sampler), &pmf);
+    if (light < 0) return;
+    pt_sampler_seek(w->sampler, dimension + PT_DIM_LIGHT);
+    u = pt_sampler_2d(w->sampler);
+    if (!pt_light_sample(w->scene, light, pti_offset(w->hit.p, w->hit.p_error, w->hit.ng, wo), u, &ls)) return;
+    f = pt_bsdf_eval(bsdf, wo, ls.wi, PT_RADIANCE, PT_LOBE_ALL);
+    if (pti_rgb_black(f)) return;
+    if ((features & PTI_WITH_ENVIRONMENT) && light == w->scene->environment_light)
+        shadow = pt_spawn_ray(w->hit.p, w->hit.p_error, w->hit.ng, ls.wi);
+    else shadow = pt_spawn_ray_to(w->hit.p, w->hit.p_error, w->hit.ng, ls.p, ls.p_error, ls.n);
+    w->rays++;
+    if (pt_occluded(w->scene, &shadow)) return;
+    c = pti_fabs(pt_v3_dot(ls.wi, bsdf->frame.n));
+    p = (double)pmf * (double)ls.pdf_w;
+    weight = technique == PTI_TECHNIQUE_MIS && !ls.delta
+                 ? pt_mis_weight(p, (double)pt_bsdf_pdf_w(bsdf, wo, ls.wi, PT_RADIANCE), w->options->heuristic) : 1.0;
+    weight *= (double)c / p;
+#if PTI_HAS_OBSERVER
+    if ((features & PTI_WITH_OBSERVER) && w->options->observer) { /* one contribution for each lobe */
+        unsigned lobe;
+        for (lobe = PT_LOBE_DIFFUSE; lobe <= PT_LOBE_GLOSSY; lobe <<= 1) {
+            if (!(bsdf->lobes & lobe)) continue;
+            if (w->edges <= PT_WORD_MAX) w->letters[w->edges - 1] = pti_letter(lobe);
+            f = pt_bsdf_eval(bsdf, wo, ls.wi, PT_RADIANCE, lobe);
+            pti_contribute(w, pt_rgb_mul(f, ls.radiance), weight, w->edges + 1, features);
+        }
+        return;
+    }
+#endif
+    pti_contribute(w, pt_rgb_mul(f, ls.radiance), weight, w->edges + 1, features);
+}
+
+/* Draws the next direction; 0 = the walk ends. */
+PTI_INLINE int pti_extend(pti_walk *w, const pt_bsdf *bsdf, pt_vec3 wo, const unsigned features)
+{
+    uint32_t dimension = PT_DIM_EDGE(w->edges);
+    pt_bsdf_sample_result s;
+    pt_vec2 u;
+    pt_real u_lobe = 0;
+    if (!bsdf->lobes) return 0;
+    pt_sampler_seek(w->sampler, dimension + PT_DIM_BSDF);
+    u = pt_sampler_2d(w->sampler);
+    s.eta = 1;
+    if (features & PTI_WITH_SPECULAR) {
+        if (bsdf->material->kind != PT_MATERIAL_DIFFUSE) {
+            pt_sampler_seek(w->sampler, dimension + PT_DIM_LOBE);
+            u_lobe = pt_sampler_1d(w->sampler);
+        }
+        if (!pt_bsdf_sample(bsdf, wo, u_lobe, u, PT_RADIANCE, &s)) return 0;
+        w->specular = s.lobe == PT_LOBE_SPECULAR;
+        w->eta2 *= (double)s.eta * (double)s.eta;
+    } else {
+        if (!pti_sample_diffuse(bsdf, wo, u, &s)) return 0;
+        w->specular = 0;
+    }
+#if PTI_HAS_OBSERVER
+    if ((features & PTI_WITH_OBSERVER) && w->edges <= PT_WORD_MAX) w->letters[w->edges - 1] = pti_letter(s.lobe);
+#endif
+    w->pdf_w = s.pdf_w;
+    w->beta = pt_rgb_mul(w->beta, s.weight);
+    w->ray = pt_spawn_ray(w->hit.p, w->hit.p_error, w->hit.ng, s.wi);
+    return !pti_rgb_black(w->beta);
+}
+
+/* Russian roulette; 0 = the walk ends. */
+PTI_INLINE int pti_roulette(pti_walk *w)
+{
+    const pt_li_options *o = w->options;
+    int constant = o->roulette == PT_ROULETTE_CONSTANT;
+    int start = o->roulette_start > 0 ? o->roulette_start : constant ? 1 : 3;
+    double q;
+    if (o->roulette == PT_ROULETTE_NONE || w->edges < start) return 1;
+    if (constant) q = o->roulette_survival > 0 ? (double)o->roulette_survival : 0.8;
+    else q = (double)pt_rgb_max(w->beta) * w->eta2;
+    q = fmin(q, 1 - PTI_2_M24);
+    pt_sampler_seek(w->sampler, PT_DIM_EDGE(w->edges) + PT_DIM_ROULETTE);
+    if (!(pti_draw(w->sampler) < q)) return 0;
+    w->beta = pt_rgb3((pt_real)((double)w->beta.r / q), (pt_real)((double)w->beta.g / q), (pt_real)((double)w->beta.b / q));
+    return 1;
+}
+
+/* What the first surface is, for the auxiliary pictures. */
+static void pti_describe_first_hit(const pti_walk *w, pt_li_info *info)
+{
+    const pt_material *m = &w->scene->materials[w->hit.material];
+    info->hit = 1;
+    info->albedo = m->kind == PT_MATERIAL_DIELECTRIC ? pt_rgb_grey(1) : m->albedo;
+    info->normal = w->hit.ns;
+    info->depth = w->hit.t;
+}
+
+PTI_INLINE pt_rgbd pti_path(const pt_scene *scene, const pt_ray *ray, pt_sampler *sampler, const pt_li_options *options,
+                            pt_li_info *info, const unsigned features, const int technique)
+{
+    pti_walk w;
+    w.scene = scene;
+    w.sampler = sampler;
+    w.options = options;
+    w.ray = *ray;
+    w.beta = pt_rgb_grey(1);
+    w.eta2 = 1;
+    w.sum = pt_rgbd3(0, 0, 0);
+    w.pdf_w = 0;
+    w.specular = 1; /* what the camera sees directly, nothing else finds */
+    w.rays = 0;
+    info->hit = 0;
+    info->cancelled = 0;
+    for (w.edges = 1;; w.edges++) {
+        pt_vec3 wo = pt_v3_neg(w.ray.d);
+        pt_rgb emission;
+        pt_bsdf bsdf;
+        w.rays++;
+        if (!pt_intersect(scene, &w.ray, &w.hit)) {
+            if ((features & PTI_WITH_ENVIRONMENT) && scene->environment_light >= 0)
+                pti_contribute(&w, scene->environment, pti_emission_weight(&w, scene->environment_light, NULL, technique),
+                               w.edges, features);
+            break;
+        }
+        if (w.edges == 1) pti_describe_first_hit(&w, info);
+        if (w.hit.light >= 0) {
+            emission = pt_hit_emission(scene, &w.hit, wo);
+            if (!pti_rgb_black(emission))
+                pti_contribute(&w, emission, pti_emission_weight(&w, w.hit.light, &w.hit, technique), w.edges, features);
+        }
+        if (w.edges == options->max_edges) break;
+        bsdf = pt_bsdf_make(&scene->materials[w.hit.material], &w.hit);
+        if (technique != PTI_TECHNIQUE_PLAIN) pti_direct(&w, &bsdf, wo, features, technique);
+        if (!pti_extend(&w, &bsdf, wo, features) || !pti_roulette(&w)) break;
+        if ((w.edges & 0xffff) == 0 && options->cancel && PTI_LOAD(options->cancel)) {
+            info->cancelled = 1;
+            break;
+        }
+    }
+    info->rays += w.rays;
+    info->edges = w.edges;
+    return w.sum;
+}
+
+PTDEF pt_rgbd pt_li_path(const pt_scene *scene, const pt_ray *ray, pt_sampler *sampler, const pt_li_options *options,
+                         pt_li_info *info)
+{
+    return pti_path(scene, ray, sampler, options, info, PTI_WITH_ALL, PTI_TECHNIQUE_MIS);
+}
+
+/* The instance for scenes that are diffuse throughout, without environment and observer. */
+static pt_rgbd pti_li_path_diffuse(const pt_scene *scene, const pt_ray *ray, pt_sampler *sampler,
+                                   const pt_li_options *options, pt_li_info *info)
+{
+    return pti_path(scene, ray, sampler, options, info, 0, PTI_TECHNIQUE_MIS);
+}
+
+#if PTI_HAS_ALL_METHODS
+PTDEF pt_rgbd pt_li_path_plain(const pt_scene *scene, const pt_ray *ray, pt_sampler *sampler,
+                               const pt_li_options *options, pt_li_info *info)
+{
+    return pti_path(scene, ray, sampler, options, info, PTI_WITH_ALL, PTI_TECHNIQUE_PLAIN);
+}
+
+PTDEF pt_rgbd pt_li_path_light(const pt_scene *scene, const pt_ray *ray, pt_sampler *sampler,
+                               const pt_li_options *options, pt_li_info *info)
+{
+    return pti_path(scene, ray, sampler, options, info, PTI_WITH_ALL, PTI_TECHNIQUE_LIGHT);
+}
+#endif
+
+/* =====================================================================================================
+   [PT-17] IMAGE FILES: implementation
+   =====================================================================================================
+   Every file is written under a temporary name and renamed when it is whole. */
+
+#if PTI_HAS_FILES
+
+typedef struct pti_writer {
+    FILE *file;
+    char temporary[4096];
+    int failed;
+} pti_writer;
+
+static int pti_writer_open(pti_writer *w, const char *path)
+{
+    w->file = NULL;
+    w->failed = 0;
+    if (!path || !*path || strlen(path) + 8 > sizeof w->temporary) return 0;
+    w->temporary[0] = 0;
+    pti_append(w->temporary, sizeof w->temporary, path);
+    pti_append(w->temporary, sizeof w->temporary, ".part");
+    w->file = fopen(w->temporary, "wb");
+    return w->file != NULL;
+}
+
+static void pti_write(pti_writer *w, const void *data, size_t size)
+{
+    if (fwrite(data, 1, size, w->file) != size) w->failed = 1;
+}
+
+static void pti_write_text(pti_writer *w, const char *text)
+{
+    pti_write(w, text, strlen(text));
+}
+
+/* Closes, and gives the file its name if all went well. */
+static pt_result pti_writer_close(pti_writer *w, const char *path)
+{
+    if (fflush(w->file) != 0) w->failed = 1;
+    if (fclose(w->file) != 0) w->failed = 1;
+#if defined(_WIN32)
+    if (!w->failed && !MoveFileExA(w->temporary, path, MOVEFILE_REPLACE_EXISTING)) w->failed = 1;
+#else
+    if (!w->failed && rename(w->temporary, path) != 0) w->failed = 1;
+#endif
+    if (w->failed) remove(w->temporary);
+    return w->failed ? PT_ERROR_FILE : PT_OK;
+}
+
+static int pti_image_size_ok(int width, int height)
+{
+    return width >= 1 && height >= 1 && width <= 65536 && height <= 65536;
+}
+
+PTDEF pt_result pt_write_ppm_bytes(const char *path, const unsigned char *rgb, int width, int height)
+{
+    char head[64] = "P6\n";
+    pti_writer w;
+    if (!rgb || !pti_image_size_ok(width, height)) return PT_ERROR_ARGUMENT;
+    if (!pti_writer_open(&w, path)) return PT_ERROR_FILE;
+    pti_append_integer(head, sizeof head, (uint64_t)width);
+    pti_append(head, sizeof head, " ");
+    pti_append_integer(head, sizeof head, (uint64_t)height);
+    pti_append(head, sizeof head, "\n255\n");
+    pti_write_text(&w, head);
+    pti_write(&w, rgb, 3 * (size_t)width * (size_t)height);
+    return pti_writer_close(&w, path);
+}
+
+PTDEF pt_result pt_write_pfm_floats(const char *path, const float *rgb, int width, int height)
+{
+    char head[64] = "PF\n";
+    pti_writer w;
+    int x, y, k;
+    if (!rgb || !pti_image_size_ok(width, height)) return PT_ERROR_ARGUMENT;
+    if (!pti_writer_open(&w, path)) return PT_ERROR_FILE;
+    pti_append_integer(head, sizeof head, (uint64_t)width);
+    pti_append(head, sizeof head, " ");
+    pti_append_integer(head, sizeof head, (uint64_t)height);
+    pti_append(head, sizeof head, "\n-1.0\n"); /* negative: little-endian */
+    pti_write_text(&w, head);
+    for (y = height - 1; y >= 0; y--)
+        for (x = 0; x < 3 * width; x++) {
+            unsigned char bytes[4];
+            uint32_t bits;
+            memcpy(&bits, &rgb[3 * (size_t)y * (size_t)width + (size_t)x], 4);
+            for (k = 0; k < 4; k++) bytes[k] = (unsigned char)((bits >> (8 * k)) & 255u);
+            pti_write(&w, bytes, 4);
+        }
+    return pti_writer_close(&w, path);
+}
+
+/* --- PNG: zlib stream of one deflate block with fixed Huffman codes (RFC 1950, 1951, PNG specification) --- */
+
+typedef struct pti_bits {
+    unsigned char *data;    /* large enough for the worst case: 9 bits a byte                              */
+    size_t size;
+    uint32_t buffer;
+    int count;
+} pti_bits;
+
+/* Least significant bit first. */
+static void pti_put_bits(pti_bits *b, uint32_t value, int count)
+{
+    b->buffer |= value << b->count;
+    for (b->count += count; b->count >= 8; b->count -= 8) {
+        b->data[b->size++] = (unsigned char)(b->buffer & 255u);
+        b->buffer >>= 8;
+    }
+}
+
+/* Huffman codes go most significant bit first. */
+static void pti_put_code(pti_bits *b, uint32_t code, int count)
+{
+    pti_put_bits(b, pti_reverse_bits(code) >> (32 - count), count);
+}
+
+/* A literal or length symbol of the fixed code [RFC 1951 3.2.6]. */
+static void pti_put_symbol(pti_bits *b, uint32_t s)
+{
+    if (s < 144) pti_put_code(b, 0x30 + s, 8);
+    else if (s < 256) pti_put_code(b, 0x190 + s - 144, 9);
+    else if (s < 280) pti_put_code(b, s - 256, 7);
+    else pti_put_code(b, 0xc0 + s - 280, 8);
+}
+
+/* Length 3..257 and distance 1..32768 [RFC 1951 3.2.5]: both codes grow like logarithms, with 4 or 2 steps an
+   octave and the rest in extra bits. */
+static void pti_put_match(pti_bits *b, uint32_t length, uint32_t distance)
+{
+    uint32_t l = length - 3, d = distance - 1, extra = 0;
+    while ((l >> extra) >= 8) extra++;
+    if (l < 8) pti_put_symbol(b, 257 + l);
+    else pti_put_symbol(b, 257 + 4 * extra + (l >> extra));
+    pti_put_bits(b, l & ((1u << extra) - 1), (int)extra);
+    for (extra = 0; (d >> extra) >= 4;) extra++;
+    pti_put_code(b, d < 4 ? d : 2 * extra + (d >> extra), 5);
+    pti_put_bits(b, d & ((1u << extra) - 1), (int)extra);
+}
+
+#define PTI_HASH_SIZE 32768u
+
+/* LZ77 with one candidate for each hash of three bytes: enough for flat parts of pictures; noise has no
+   repetitions to find. */
+static void pti_deflate(pti_bits *b, const unsigned char *data, size_t size, size_t *heads)
+{
+    size_t i = 0, k;
+    for (k = 0; k < PTI_HASH_SIZE; k++) heads[k] = SIZE_MAX;
+    pti_put_bits(b, 1, 1); /* last block */
+    pti_put_bits(b, 1, 2); /* fixed codes */
+    while (i < size) {
+        uint32_t length = 0;
+        size_t at = SIZE_MAX;
+        if (i + 3 <= size) {
+            uint32_t h = (uint32_t)data[i] | (uint32_t)data[i + 1] << 8 | (uint32_t)data[i + 2] << 16;
+            h = (h * 2654435761u) >> 17;
+            at = heads[h];
+            heads[h] = i;
+        }
+        if (at != SIZE_MAX && i - at <= 32768)
+            while (length < 257 && i + length < size && data[at + length] == data[i + length]) length++;
+        if (length >= 3) {
+            pti_put_match(b, length, (uint32_t)(i - at));
+            i += length;
+        } else {
+            pti_put_symbol(b, data[i++]);
+        }
+    }
+    pti_put_symbol(b, 256);
+    if (b->count > 0) pti_put_bits(b, 0, 8 - b->count);
+}
+
+/* PNG filters 1 (Sub), 2 (Up) and 4 (Paeth) of one byte; a left, p above, c above left. */
+static unsigned char pti_png_filter(int type, int x, int a, int p, int c)
+{
+    int guess = a + p - c, da, dp, dc, paeth;
+    if (type == 1) return (unsigned char)(x - a);
+    if (type == 2) return (unsigned char)(x - p);
+    da = guess > a ? guess - a : a - guess;
+    dp = guess > p ? guess - p : p - guess;
+    dc = guess > c ? guess - c : c - guess;
+    paeth = da <= dp && da <= dc ? a : dp <= dc ? p : c;
+    return (unsigned char)(x - paeth);
+}
+
+/* One row with the filter whose output is smallest as signed bytes; out: type and 3 * width bytes. */
+static void pti_png_row(const unsigned char *rgb, int width, int y, unsigned char *out)
+{
+    static const int types[3] = {1, 2, 4};
+    size_t stride = 3 * (size_t)width, k;
+    const unsigned char *row = rgb + (size_t)y * stride;
+    uint64_t best = UINT64_MAX;
+    int pass, chosen = 1, t;
+    for (pass = 0; pass < 4; pass++) {
+        uint64_t sum = 0;
+        t = pass < 3 ? types[pass] : chosen;
+        for (k = 0; k < stride; k++) {
+            unsigned char v = pti_png_filter(t, row[k], k < 3 ? 0 : row[k - 3], y == 0 ? 0 : row[k - stride],
+                                             y == 0 || k < 3 ? 0 : row[k - stride - 3]);
+            out[1 + k] = v;
+            sum += v < 128 ? v : 256u - v;
+        }
+        if (sum < best) {
+            best = sum;
+            chosen = t;
+        }
+    }
+    out[0] = (unsigned char)chosen;
+}
+
+static uint32_t pti_crc32(uint32_t crc, const unsigned char *data, size_t size)
+{
+    size_t i;
+    int k;
+    crc = ~crc;
+    for (i = 0; i < size; i++) {
+        crc ^= data[i];
+        for (k = 0; k < 8; k++) crc = (crc >> 1) ^ (0xedb88320u & (0u - (crc & 1u)));
+    }
+    return ~crc;
+}
+
+static uint32_t pti_adler32(const unsigned char *data, size_t size)
+{
+    uint32_t a = 1, b = 0;
+    size_t i;
+    for (i = 0; i < size; i++) {
+        a = (a + data[i]) % 65521u;
+        b = (b + a) % 65521u;
+    }
+    return b << 16 | a;
+}
+
+static void pti_big_endian(unsigned char *p, uint32_t v)
+{
+    p[0] = (unsigned char)(v >> 24);
+    p[1] = (unsigned char)((v >> 16) & 255u);
+    p[2] = (unsigned char)((v >> 8) & 255u);
+    p[3] = (unsigned char)(v & 255u);
+}
+
+static void pti_png_chunk(pti_writer *w, const char *type, const unsigned char *data, size_t size)
+{
+    unsigned char head[8], tail[4];
+    pti_big_endian(head, (uint32_t)size);
+    memcpy(head + 4, type, 4);
+    pti_big_endian(tail, pti_crc32(pti_crc32(0, head + 4, 4), data, size));
+    pti_write(w, head, 8);
+    pti_write(w, data, size);
+    pti_write(w, tail, 4);
+}
+
+/* The zlib stream of all rows; 0 = no memory. */
+static int pti_png_compress(const unsigned char *rgb, int width, int height, pti_bits *b)
+{
+    size_t stride = 3 * (size_t)width + 1, size = stride * (size_t)height;
+    unsigned char *raw = (unsigned char *)pti_alloc(size, 1, NULL);
+    size_t *heads = (size_t *)pti_alloc(PTI_HASH_SIZE, sizeof *heads, NULL);
+    int y, ok;
+    memset(b, 0, sizeof *b);
+    b->data = (unsigned char *)pti_alloc(size + size / 8 + 64, 1, NULL);
+    ok = raw && heads && b->data;
+    for (y = 0; ok && y < height; y++) pti_png_row(rgb, width, y, raw + (size_t)y * stride);
+    if (ok) {
+        b->data[b->size++] = 0x78;
+        b->data[b->size++] = 0x01;
+        pti_deflate(b, raw, size, heads);
+        pti_big_endian(b->data + b->size, pti_adler32(raw, size));
+        b->size += 4;
+    }
+    pti_free(raw, NULL);
+    pti_free(heads, NULL);
+    if (!ok) pti_free(b->data, NULL);
+    return ok;
+}
+
+PTDEF pt_result pt_write_png_bytes(const char *path, const unsigned char *rgb, int width, int height)
+{
+    static const unsigned char signature[8] = {137, 80, 78, 71, 13, 10, 26, 10};
+    unsigned char header[13] = {0, 0, 0, 0, 0, 0, 0, 0, 8, 2, 0, 0, 0}; /* 8 bits, RGB */
+    pti_writer w;
+    pti_bits b;
+    if (!rgb || !pti_image_size_ok(width, height)) return PT_ERROR_ARGUMENT;
+    if (3.4 * width * height > 2147483647.0) return PT_ERROR_ARGUMENT; /* a chunk is shorter than 2^31 */
+    if (!pti_png_compress(rgb, width, height, &b)) return PT_ERROR_MEMORY;
+    if (!pti_writer_open(&w, path)) {
+        pti_free(b.data, NULL);
+        return PT_ERROR_FILE;
+    }
+    pti_big_endian(header, (uint32_t)width);
+    pti_big_endian(header + 4, (uint32_t)height);
+    pti_write(&w, signature, 8);
+    pti_png_chunk(&w, "IHDR", header, 13);
+    pti_png_chunk(&w, "IDAT", b.data, b.size);
+    pti_png_chunk(&w, "IEND", header, 0);
+    pti_free(b.data, NULL);
+    return pti_writer_close(&w, path);
+}
+
+/* The film as 8-bit sRGB; NULL = no memory. */
+static unsigned char *pti_film_bytes(const pt_film *film, double exposure)
+{
+    size_t n = 3 * (size_t)film->width * (size_t)film->height, k;
+    unsigned char *rgb = (unsigned char *)pti_alloc(n, 1, film->alloc_user);
+    for (k = 0; rgb && k < n; k++) rgb[k] = pt_srgb_byte(exposure * pti_film_value(film, 2, k));
+    return rgb;
+}
+
+static pt_result pti_write_film(const char *path, const pt_film *film, double exposure,
+                                pt_result (*write)(const char *, const unsigned char *, int, int))
+{
+    unsigned char *rgb;
+    pt_result result;
+    if (!film->half[0] || !(exposure >= 0) || !pti_finite(exposure)) return PT_ERROR_ARGUMENT;
+    rgb = pti_film_bytes(film, exposure);
+    if (!rgb) return PT_ERROR_MEMORY;
+    result = write(path, rgb, film->width, film->height);
+    pti_free(rgb, film->alloc_user);
+    return result;
+}
+
+PTDEF pt_result pt_write_ppm(const char *path, const pt_film *film, double exposure)
+{
+    return pti_write_film(path, film, exposure, pt_write_ppm_bytes);
+}
+
+PTDEF pt_result pt_write_png(const char *path, const pt_film *film, double exposure)
+{
+    return pti_write_film(path, film, exposure, pt_write_png_bytes);
+}
+
+PTDEF pt_result pt_write_pfm(const char *path, const pt_film *film)
+{
+    size_t n = 3 * (size_t)film->width * (size_t)film->height, k;
+    float *rgb;
+    pt_result result;
+    if (!film->half[0]) return PT_ERROR_ARGUMENT;
+    rgb = (float *)pti_alloc(n, sizeof *rgb, film->alloc_user);
+    if (!rgb) return PT_ERROR_MEMORY;
+    for (k = 0; k < n; k++) rgb[k] = (float)pti_film_value(film, 2, k);
+    result = pt_write_pfm_floats(path, rgb, film->width, film->height);
+    pti_free(rgb, film->alloc_user);
+    return result;
+}
+
+#endif /* PTI_HAS_FILES */
+
+/* =====================================================================================================
+   [PT-18] RENDER DRIVER: implementation
+   =====================================================================================================
+   A render is a sequence of passes over the film, each a range of samples; after each the error is estimated
+   and the budgets are asked. A pass works on a copy of the sums and replaces them when it is complete, so that
+   a cancelled pass leaves no trace. Samples of a pixel are added in the order of their index, by whichever
+   thread has the tile; nothing else is shared, and so the film is the same bits for any threads, tiles and
+   passes. */
+
+PTDEF const pt_method *pt_methods(int *count)
+{
+    enum { ALL = 0xfff };
+    static const pt_method methods[] = {
+        {"path", "path tracing, light and BSDF sampling combined (MIS)", pt_li_path, ALL},
+#if PTI_HAS_ALL_METHODS
+        {"path-light", "path tracing, light sampling only", pt_li_path_light, ALL},
+        {"path-plain", "path tracing, light found by hitting it", pt_li_path_plain, ALL & ~PT_NEEDS_POINT_LIGHTS},
+#endif
+    };
+    *count = (int)(sizeof methods / sizeof methods[0]);
+    return methods;
+}
+
+PTDEF const pt_method *pt_method_find(const char *name)
+{
+    int count, i;
+    const pt_method *m = pt_methods(&count);
+    for (i = 0; i < count; i++)
+        if (strcmp(m[i].name, name ? name : "path") == 0) return &m[i];
+    return NULL;
+}
+
+/* The smallest instance of the method's body that covers the scene. */
+static pt_li_fn pti_pick_instance(const pt_method *method, const pt_scene *scene, const pt_render_desc *desc,
+                                  const char **body)
+{
+    const unsigned diffuse = PT_NEEDS_TRIANGLES | PT_NEEDS_PARALLELOGRAMS | PT_NEEDS_SPHERES | PT_NEEDS_SHADING_NORMALS |
+                             PT_NEEDS_UVS | PT_NEEDS_DIFFUSE | PT_NEEDS_AREA_LIGHTS | PT_NEEDS_POINT_LIGHTS | PT_NEEDS_BVH;
+    int observed = 0;
+#if PTI_HAS_OBSERVER
+    observed = desc->li.observer != NULL;
+#endif
+    *body = "general";
+    if (method->li != pt_li_path || desc->general_body || observed || (scene->needs & ~diffuse)) return method->li;
+    *body = "diffuse";
+    return pti_li_path_diffuse;
+}
+
+PTDEF const char *pt_sampler_name(pt_sampler_kind kind)
+{
+    switch (kind) {
+    case PT_SAMPLER_SOBOL: return "sobol";
+    case PT_SAMPLER_INDEPENDENT: return "independent";
+    case PT_SAMPLER_STRATIFIED: return "stratified";
+    case PT_SAMPLER_GIVEN: return "given";
+    }
+    return "unknown";
+}
+
+PTDEF pt_render_desc pt_render_defaults(void)
+{
+    pt_render_desc d;
+    memset(&d, 0, sizeof d);
+    d.spp = 64;
+    return d;
+}
+
+/* --- fingerprint --- */
+
+static void pti_hash_word(uint64_t *h, uint64_t x)
+{
+    *h = pt_hash64(*h ^ x);
+}
+static void pti_hash_double(uint64_t *h, double x)
+{
+    uint64_t bits;
+    if (x == 0) x = 0; /* -0 renders as 0 does */
+    memcpy(&bits, &x, sizeof bits);
+    pti_hash_word(h, bits);
+}
+static void pti_hash_vec(uint64_t *h, pt_vec3 v)
+{
+    pti_hash_double(h, (double)v.x);
+    pti_hash_double(h, (double)v.y);
+    pti_hash_double(h, (double)v.z);
+}
+static void pti_hash_rgb(uint64_t *h, pt_rgb c)
+{
+    pti_hash_vec(h, pt_v3(c.r, c.g, c.b));
+}
+static void pti_hash_text(uint64_t *h, const char *text)
+{
+    for (; *text; text++) pti_hash_word(h, (unsigned char)*text);
+}
+
+static void pti_hash_scene(uint64_t *h, const pt_scene *s)
+{
+    uint32_t i;
+    for (i = 0; i < s->material_count; i++) {
+        pti_hash_word(h, (uint64_t)s->materials[i].kind);
+        pti_hash_rgb(h, s->materials[i].albedo);
+        pti_hash_rgb(h, s->materials[i].emission);
+        pti_hash_double(h, (double)s->materials[i].ior);
+    }
+    for (i = 0; i < s->position_count; i++) pti_hash_vec(h, s->positions[i]);
+    for (i = 0; i < s->normal_count; i++) pti_hash_vec(h, s->normals[i]);
+    for (i = 0; i < s->triangle_count; i++) {
+        pti_hash_word(h, (uint64_t)s->triangles[i].v[0] << 32 | s->triangles[i].v[1]);
+        pti_hash_word(h, (uint64_t)s->triangles[i].v[2] << 32 | (uint32_t)s->triangles[i].material);
+    }
+    for (i = 0; i < s->sphere_count; i++) {
+        pti_hash_vec(h, s->spheres[i].centre);
+        pti_hash_double(h, (double)s->spheres[i].radius);
+        pti_hash_word(h, (uint64_t)s->spheres[i].material);
+    }
+    for (i = 0; i < s->parallelogram_count; i++) {
+        pti_hash_vec(h, s->parallelograms[i].corner);
+        pti_hash_vec(h, s->parallelograms[i].edge1);
+        pti_hash_vec(h, s->parallelograms[i].edge2);
+        pti_hash_word(h, (uint64_t)s->parallelograms[i].material);
+    }
+    for (i = 0; i < s->point_light_count; i++) {
+        pti_hash_vec(h, s->point_lights[i].position);
+        pti_hash_rgb(h, s->point_lights[i].intensity);
+    }
+    pti_hash_rgb(h, s->environment);
+}
+
+/* What the bits of a film depend on. `planned` is the sample count of the stratified sampler, else 0. */
+static uint64_t pti_fingerprint(const pt_scene *scene, const pt_render_desc *d, const pt_method *method, uint32_t planned)
+{
+    uint64_t h = sizeof(pt_real);
+    const pt_camera *c = &d->camera;
+    pti_hash_text(&h, PT_VERSION_STRING);
+    pti_hash_scene(&h, scene);
+    pti_hash_vec(&h, c->position);
+    pti_hash_vec(&h, c->right);
+    pti_hash_vec(&h, c->up);
+    pti_hash_vec(&h, c->forward);
+    pti_hash_vec(&h, pt_v3(c->tan_half, c->lens_radius, c->focus_distance));
+    pti_hash_double(&h, (double)c->near_distance);
+    pti_hash_word(&h, (uint64_t)d->width << 32 | (uint64_t)d->height);
+    pti_hash_text(&h, method->name);
+    pti_hash_word(&h, (uint64_t)d->sampler << 32 | planned);
+    pti_hash_word(&h, d->seed);
+    pti_hash_word(&h, (uint64_t)d->li.max_edges << 32 | (uint64_t)d->li.roulette << 16 | (uint64_t)d->li.heuristic);
+    pti_hash_double(&h, (double)d->li.roulette_survival);
+    pti_hash_word(&h, (uint64_t)d->li.roulette_start << 1 | (uint64_t)(d->single_net != 0));
+    return h;
+}
+
+/* --- one pass --- */
+
+/* What the tasks of a pass share. */
+typedef struct pti_pass {
+    const pt_scene *scene;
+    const pt_render_desc *desc;
+    pt_li_fn li;
+    pt_li_options options;
+    pt_film *film;          /* the copy that the pass works on                                             */
+    uint32_t begin, end;    /* samples                                                                     */
+    uint32_t planned;       /* samples a half (stratified)                                                 */
+    int tile, columns, tiles;
+    uint64_t *rays, *nonfinite; /* a slot for each tile                                                    */
+    int cancel;
+    /* progress, under the lock */
+#if PTI_HAS_THREADS
+    pti_mutex lock;
+#endif
+    int tiles_done;
+    uint64_t rays_done;
+    double start, last_call, passed_spp, target_spp, relmse;
+} pti_pass;
+
+static void pti_pass_lock(pti_pass *p)
+{
+#if PTI_HAS_THREADS
+    pti_lock(&p->lock);
+#else
+    (void)p;
+#endif
+}
+static void pti_pass_unlock(pti_pass *p)
+{
+#if PTI_HAS_THREADS
+    pti_unlock(&p->lock);
+#else
+    (void)p;
+#endif
+}
+
+/* One sample of one pixel, added to the film. */
+static void pti_render_sample(pti_pass *p, pt_sampler *sampler, int x, int y, uint32_t sample, uint64_t *rays, uint64_t *nonfinite)
+{
+    const pt_render_desc *d = p->desc;
+    size_t pixel = (size_t)y * (size_t)d->width + (size_t)x;
+    int half = d->single_net ? 0 : (int)(sample & 1u);
+    double *sum = p->film->half[half] + 3 * pixel;
+    pt_vec2 u, lens = pt_v2(0, 0);
+    pt_li_info info;
+    pt_rgbd L;
+    pt_ray ray;
+    /* Each half is a net of its own: another stream. */
+    pt_sampler_start(sampler, 2 * (uint64_t)pixel + (uint64_t)half, d->single_net ? sample : sample >> 1);
+    u = pt_sampler_2d(sampler);
+    if (d->camera.lens_radius > 0) lens = pt_sampler_2d(sampler);
+    ray = pt_camera_ray(&d->camera, (pt_real)d->width / (pt_real)d->height, ((pt_real)x + u.x) / (pt_real)d->width,
+                        ((pt_real)y + u.y) / (pt_real)d->height, lens);
+    info.rays = 0;
+    L = p->li(p->scene, &ray, sampler, &p->options, &info);
+    *rays += info.rays;
+    if (pti_finite(L.r) && pti_finite(L.g) && pti_finite(L.b)) {
+        sum[0] += L.r;
+        sum[1] += L.g;
+        sum[2] += L.b;
+    } else {
+        ++*nonfinite;
+    }
+    if (p->film->albedo && info.hit) {
+        const pt_rgb a = info.albedo;
+        const pt_vec3 n = info.normal;
+        double *albedo = p->film->albedo + 3 * pixel, *normal = p->film->normal + 3 * pixel;
+        albedo[0] += (double)a.r; albedo[1] += (double)a.g; albedo[2] += (double)a.b;
+        normal[0] += (double)n.x; normal[1] += (double)n.y; normal[2] += (double)n.z;
+        p->film->depth[pixel] += (double)info.depth;
+    }
+}
+
+/* Calls the user's callback if it is time; its wish to stop is noted. */
+static void pti_report_progress(pti_pass *p)
+{
+    pt_progress now;
+    double wall = pt_wall_seconds(), done;
+    if (!p->desc->progress || wall - p->last_call < 0.1) return;
+    p->last_call = wall;
+    now.spp = p->passed_spp + (double)(p->end - p->begin) * p->tiles_done / p->tiles;
+    now.spp_target = p->target_spp;
+    now.seconds = wall - p->start;
+    now.rays_per_second = now.seconds > 0 ? (double)p->rays_done / now.seconds : 0;
+    now.relmse = p->relmse;
+    now.seconds_left = -1;
+    done = p->target_spp > 0 ? now.spp / p->target_spp : 0;
+    if (done > 0) now.seconds_left = now.seconds * (1 - done) / done;
+    if (p->desc->seconds > 0) {
+        double left = fmax(0, p->desc->seconds - now.seconds);
+        if (now.seconds_left < 0 || left < now.seconds_left) now.seconds_left = left;
+    }
+    if (p->desc->progress(p->desc->progress_user, &now)) PTI_STORE(&p->cancel, 1);
+}
+
+/* A task: one tile, all samples of the pass. */
+static void pti_render_tile(void *context, int index)
+{
+    pti_pass *p = (pti_pass *)context;
+    const pt_render_desc *d = p->desc;
+    int x0 = (index % p->columns) * p->tile, y0 = (index / p->columns) * p->tile;
+    int x1 = x0 + p->tile < d->width ? x0 + p->tile : d->width, y1 = y0 + p->tile < d->height ? y0 + p->tile : d->height;
+    pt_sampler sampler = pt_sampler_make(d->sampler, d->seed, p->planned);
+    uint64_t rays = 0, nonfinite = 0;
+    uint32_t s;
+    int x, y;
+    for (y = y0; y < y1; y++)
+        for (x = x0; x < x1; x++) {
+            if (PTI_LOAD(&p->cancel)) return;
+            for (s = p->begin; s < p->end; s++) pti_render_sample(p, &sampler, x, y, s, &rays, &nonfinite);
+        }
+    p->rays[index] = rays;
+    p->nonfinite[index] = nonfinite;
+    pti_pass_lock(p);
+    p->tiles_done++;
+    p->rays_done += rays;
+    pti_report_progress(p);
+    pti_pass_unlock(p);
+}
+
+/* Copies the sums of a film of the same shape. */
+static void pti_film_copy_sums(pt_film *to, const pt_film *from)
+{
+    size_t n = (size_t)from->width * (size_t)from->height * sizeof(double);
+    memcpy(to->half[0], from->half[0], 3 * n);
+    memcpy(to->half[1], from->half[1], 3 * n);
+    if (from->albedo) memcpy(to->albedo, from->albedo, 3 * n);
+    if (from->normal) memcpy(to->normal, from->normal, 3 * n);
+    if (from->depth) memcpy(to->depth, from->depth, n);
+}
+
+static void pti_swap_sums(double **a, double **b)
+{
+    double *t = *a;
+    *a = *b;
+    *b = t;
+}
+
+/* A completed pass becomes the film. */
+static pt_result pti_accept_pass(pti_pass *p, pt_film *film)
+{
+    pt_film *copy = p->film;
+    uint32_t odd = p->end / 2 - p->begin / 2; /* odd samples in the range */
+    pt_result result = pt_film_add_range(film, p->begin, p->end);
+    int i;
+    if (result != PT_OK) return result;
+    if (p->desc->single_net) odd = 0;
+    film->samples[0] += p->end - p->begin - odd;
+    film->samples[1] += odd;
+    pti_swap_sums(&film->half[0], &copy->half[0]);
+    pti_swap_sums(&film->half[1], &copy->half[1]);
+    pti_swap_sums(&film->albedo, &copy->albedo);
+    pti_swap_sums(&film->normal, &copy->normal);
+    pti_swap_sums(&film->depth, &copy->depth);
+    for (i = 0; i < p->tiles; i++) film->nonfinite += p->nonfinite[i];
+    return PT_OK;
+}
+
+static pt_result pti_render_pass(pti_pass *p, pt_film *film, uint32_t begin, uint32_t end, int threads)
+{
+    p->begin = begin;
+    p->end = end;
+    p->tiles_done = 0;
+    pti_film_copy_sums(p->film, film);
+    if (p->desc->parallel) p->desc->parallel(p->desc->parallel_user, p->tiles, pti_render_tile, p);
+    else pti_parallel(threads, p->tiles, pti_render_tile, p);
+    if (PTI_LOAD(&p->cancel)) return PT_ERROR_CANCELLED;
+    return pti_accept_pass(p, film);
+}
+
+/* --- the sequence of passes --- */
+
+/* Appends a row to the report. */
+static pt_result pti_report_row(pt_report *report, const pt_film *film, const pt_render_desc *desc, const pt_report *now)
+{
+#if PTI_HAS_REPORT
+    pt_report_row *row;
+    double relmse;
+    if (!pti_reserve((void **)&report->rows, &report->row_capacity, (size_t)report->row_count + 1, sizeof *report->rows,
+                     report->alloc_user))
+        return PT_ERROR_MEMORY;
+    row = &report->rows[report->row_count++];
+    memset(row, 0, sizeof *row);
+    row->spp = now->spp;
+    row->cpu_seconds = now->cpu_seconds;
+    row->wall_seconds = now->wall_seconds;
+    row->rays = now->rays;
+    row->estimated = pt_film_error_estimate(film, &row->error);
+    row->has_true_error = desc->reference != NULL;
+    if (desc->reference) {
+        pt_film_error(film, desc->reference, &row->true_error);
+        row->true_error.relmse_001 -= desc->reference_mse_001;
+    }
+    relmse = row->has_true_error ? row->true_error.relmse : row->error.relmse;
+    row->efficiency = relmse > 0 && row->cpu_seconds > 0 ? 1 / (relmse * row->cpu_seconds) : 0;
+#else
+    (void)report;
+    (void)film;
+    (void)desc;
+    (void)now;
+#endif
+    return PT_OK;
+}
+
+/* Everything a desc can have wrong; fills in defaults. */
+static pt_result pti_check_desc(const pt_scene *scene, pt_render_desc *d, const pt_method **method)
+{
+    const pt_li_options *o = &d->li;
+    int timed = d->seconds > 0 || d->cpu_seconds > 0 || d->target_error > 0;
+    if (!scene->committed) return scene->error != PT_OK ? scene->error : PT_ERROR_NOT_COMMITTED;
+    if (d->width == 0) d->width = 256;
+    if (d->height == 0) d->height = 256;
+    if (d->tile == 0) d->tile = 16;
+    if (d->spp == 0 && !timed) d->spp = 64;
+    if (d->threads == 0) d->threads = pt_hardware_threads();
+    if (d->width < 1 || d->height < 1 || d->width > 65536 || d->height > 65536) return PT_ERROR_ARGUMENT;
+    if (d->tile < 1 || d->tile > 65536 || d->threads < 1) return PT_ERROR_ARGUMENT;
+    if (!(d->camera.tan_half > 0) || !pti_finite((double)d->camera.tan_half)) return PT_ERROR_ARGUMENT;
+    if (!(d->camera.lens_radius >= 0) || !pti_finite((double)d->camera.lens_radius)) return PT_ERROR_ARGUMENT;
+    if (!(d->camera.focus_distance >= 0) || !pti_finite((double)d->camera.focus_distance)) return PT_ERROR_ARGUMENT;
+    if (!(d->camera.near_distance >= 0) || !pti_finite((double)d->camera.near_distance)) return PT_ERROR_ARGUMENT;
+    if (!(d->seconds >= 0) || !(d->cpu_seconds >= 0) || !(d->target_error >= 0)) return PT_ERROR_ARGUMENT;
+    if ((int)d->sampler < 0 || d->sampler >= PT_SAMPLER_GIVEN) return PT_ERROR_ARGUMENT;
+    if (d->sampler == PT_SAMPLER_STRATIFIED && timed) return PT_ERROR_ARGUMENT; /* needs the count beforehand */
+    if (d->spp > UINT32_MAX - d->first_sample) return PT_ERROR_ARGUMENT;
+    if (o->max_edges < 0 || o->roulette_start < 0) return PT_ERROR_ARGUMENT;
+    if ((int)o->roulette < 0 || o->roulette > PT_ROULETTE_NONE || (int)o->heuristic < 0 || o->heuristic > PT_HEURISTIC_BALANCE)
+        return PT_ERROR_ARGUMENT;
+    if (!(o->roulette_survival >= 0 && o->roulette_survival < 1)) return PT_ERROR_ARGUMENT;
+    if (o->roulette == PT_ROULETTE_NONE && o->max_edges == 0) return PT_ERROR_ARGUMENT; /* would never end */
+    *method = pt_method_find(d->method);
+    return *method ? PT_OK : PT_ERROR_ARGUMENT;
+}
+
+/* An empty film is made; a filled one must be of this picture and reach from first_sample without a gap. */
+static pt_result pti_prepare_film(pt_film *film, const pt_render_desc *d, uint64_t fingerprint)
+{
+    pt_result result;
+    if (film->half[0] && film->range_count > 0) {
+        if (film->fingerprint != fingerprint || film->width != d->width || film->height != d->height) return PT_ERROR_MISMATCH;
+        if (film->range_count != 1 || film->ranges[0].begin != d->first_sample) return PT_ERROR_MISMATCH;
+        return (film->albedo != NULL) == (d->aov != 0) ? PT_OK : PT_ERROR_MISMATCH;
+    }
+    result = pt_film_make(film, d->width, d->height, d->aov);
+    film->fingerprint = fingerprint;
+    return result;
+}
+
+/* The end of the next pass: doubling, cut to what the remaining time is likely to allow. */
+static uint32_t pti_next_end(const pt_render_desc *d, uint32_t done, uint32_t made, double wall, double cpu)
+{
+    uint32_t end = 1, most = d->spp ? d->spp : UINT32_MAX - d->first_sample;
+    double left = HUGE_VAL;
+    while (end <= done && end < 0x80000000u) end *= 2;
+    if (end > most) end = most;
+    if (made > 0 && d->seconds > 0) left = (d->seconds - wall) * made / wall;
+    if (made > 0 && d->cpu_seconds > 0) left = fmin(left, (d->cpu_seconds - cpu) * made / cpu);
+    if (left < end - done) end = done + (left > 1 ? (uint32_t)left : 1);
+    return end;
+}
+
+/* Renders passes until a budget ends; `now` counts. */
+static pt_result pti_run_passes(pti_pass *p, pt_film *film, pt_report *report, pt_report *now)
+{
+    const pt_render_desc *d = p->desc;
+    uint32_t done = pt_film_spp(film), made = 0, end;
+    double cpu = pt_cpu_seconds();
+    pt_result result = PT_OK;
+    pt_error error;
+    for (;;) {
+        if (d->spp && done >= d->spp) now->stopped_by = "samples";
+        else if (made && d->seconds > 0 && now->wall_seconds >= d->seconds) now->stopped_by = "seconds";
+        else if (made && d->cpu_seconds > 0 && now->cpu_seconds >= d->cpu_seconds) now->stopped_by = "CPU seconds";
+        else if (made && d->target_error > 0 && p->relmse >= 0 && sqrt(p->relmse) < d->target_error) now->stopped_by = "error";
+        if (now->stopped_by) break;
+        end = pti_next_end(d, done, made, now->wall_seconds, now->cpu_seconds);
+        if (end <= done) {
+            now->stopped_by = "sample indices used up";
+            break;
+        }
+        p->passed_spp = done;
+        p->target_spp = d->spp;
+        result = pti_render_pass(p, film, d->first_sample + done, d->first_sample + end, d->threads);
+        now->wall_seconds = pt_wall_seconds() - p->start;
+        now->cpu_seconds = pt_cpu_seconds() - cpu;
+        now->rays = p->rays_done;
+        if (result != PT_OK) {
+            now->stopped_by = result == PT_ERROR_CANCELLED ? "cancelled" : "memory";
+            break;
+        }
+        made += end - done;
+        done = end;
+        now->spp = done;
+        p->relmse = pt_film_error_estimate(film, &error) ? error.relmse : -1;
+        if ((done & (done - 1)) == 0 || done == d->spp) result = pti_report_row(report, film, d, now);
+        if (result != PT_OK) break;
+    }
+    if (result == PT_OK && made && (report->row_count == 0 || report->rows[report->row_count - 1].spp != done))
+        result = pti_report_row(report, film, d, now);
+    return result;
+}
+
+/* Starts a report anew: its rows are kept as room. */
+static void pti_report_start(pt_report *r, const pt_render_desc *d, const pt_method *method, const pt_scene *scene, const char *body)
+{
+    pt_report old = *r;
+    memset(r, 0, sizeof *r);
+    r->alloc_user = old.alloc_user;
+    r->rows = old.rows;
+    r->row_capacity = old.row_capacity;
+    r->width = d->width;
+    r->height = d->height;
+    r->threads = d->parallel ? 0 : d->threads;
+    r->wall_resolution = pt_wall_resolution();
+    r->method = method->name;
+    r->sampler = pt_sampler_name(d->sampler);
+    r->body = body;
+    r->needs = scene->needs;
+}
+
+static pt_result pti_render_with(pti_pass *p, pt_film *film, pt_film *copy, pt_report *report)
+{
+    const pt_render_desc *d = p->desc;
+    pt_report now = *report;
+    pt_result result = pt_film_make(copy, d->width, d->height, d->aov);
+    uint64_t nonfinite = film->nonfinite;
+    p->columns = (d->width + d->tile - 1) / d->tile;
+    p->tiles = p->columns * ((d->height + d->tile - 1) / d->tile);
+    p->tile = d->tile;
+    p->rays = (uint64_t *)pti_alloc_zero((size_t)p->tiles, sizeof *p->rays, film->alloc_user);
+    p->nonfinite = (uint64_t *)pti_alloc_zero((size_t)p->tiles, sizeof *p->nonfinite, film->alloc_user);
+    if (!p->rays || !p->nonfinite) result = PT_ERROR_MEMORY;
+    if (result == PT_OK) result = pti_run_passes(p, film, report, &now);
+    report->spp = pt_film_spp(film);
+    report->cpu_seconds = now.cpu_seconds;
+    report->wall_seconds = now.wall_seconds;
+    report->rays = now.rays;
+    report->nonfinite = film->nonfinite - nonfinite;
+    report->stopped_by = now.stopped_by ? now.stopped_by : "memory";
+    pti_free(p->rays, film->alloc_user);
+    pti_free(p->nonfinite, film->alloc_user);
+    return result;
+}
+
+PTDEF pt_result pt_render(const pt_scene *scene, const pt_render_desc *desc, pt_film *film, pt_report *report)
+{
+    pt_render_desc d = *desc;
+    pt_report own = PT_REPORT_INIT;
+    pt_film copy = PT_FILM_INIT;
+    const pt_method *method = NULL;
+    const char *body;
+    pti_pass p;
+    pt_result result = pti_check_desc(scene, &d, &method);
+    if (result != PT_OK) return result;
+    memset(&p, 0, sizeof p);
+    p.start = p.last_call = pt_wall_seconds();
+    p.planned = d.sampler == PT_SAMPLER_STRATIFIED ? (d.single_net ? d.first_sample + d.spp : (d.first_sample + d.spp + 1) / 2) : 0;
+    result = pti_prepare_film(film, &d, pti_fingerprint(scene, &d, method, p.planned));
+    if (result != PT_OK) return result;
+    if (!report) {
+        own.alloc_user = film->alloc_user;
+        report = &own;
+    }
+    p.scene = scene;
+    p.desc = &d;
+    p.li = pti_pick_instance(method, scene, &d, &body);
+    p.options = d.li;
+    p.relmse = -1;
+    if (!p.options.cancel) p.options.cancel = &p.cancel;
+    p.film = &copy;
+    copy.alloc_user = film->alloc_user;
+#if PTI_HAS_THREADS
+    if (!pti_mutex_make(&p.lock)) return PT_ERROR_MEMORY;
+#endif
+    pti_report_start(report, &d, method, scene, body);
+    result = pti_render_with(&p, film, &copy, report);
+#if PTI_HAS_THREADS
+    pti_mutex_free(&p.lock);
+#endif
+    pt_film_free(&copy);
+    pt_report_free(&own);
+    return result;
+}
+
+PTDEF void pt_report_free(pt_report *report)
+{
+    void *user = report->alloc_user;
+    pti_free(report->rows, user);
+    memset(report, 0, sizeof *report);
+    report->alloc_user = user;
+}
+
+#if PTI_HAS_STDIO && PTI_HAS_REPORT
+
+static void pti_print_number(FILE *file, double value, int width, int known)
+{
+    char text[40] = "";
+    int i;
+    if (known) pti_append_real(text, sizeof text, value);
+    else pti_append(text, sizeof text, "unknown");
+    for (i = (int)strlen(text); i < width; i++) fputc(' ', file);
+    fputs(text, file);
+}
+
+PTDEF void pt_report_print(const pt_report *report, FILE *file)
+{
+    uint32_t i;
+    int truth = report->row_count > 0 && report->rows[0].has_true_error;
+    fprintf(file, "%s, %s sampler, %s body, %d x %d pixels, ", report->method ? report->method : "no render",
+            report->sampler ? report->sampler : "no", report->body ? report->body : "no", report->width, report->height);
+    if (report->threads > 0) fprintf(file, "%d threads\n", report->threads);
+    else fprintf(file, "the caller's threads\n");
+    fprintf(file, "       spp      CPU s     wall s     Mrays/s   est. RMSE  est. relMSE  efficiency%s\n",
+            truth ? "   true RMSE  true relMSE" : "");
+    for (i = 0; i < report->row_count; i++) {
+        const pt_report_row *r = &report->rows[i];
+        fprintf(file, "%10lu", (unsigned long)r->spp);
+        pti_print_number(file, r->cpu_seconds, 11, 1);
+        pti_print_number(file, r->wall_seconds, 11, 1);
+        pti_print_number(file, r->wall_seconds > 0 ? 1e-6 * (double)r->rays / r->wall_seconds : 0, 12, r->wall_seconds > 0);
+        pti_print_number(file, r->error.rmse, 12, r->estimated);
+        pti_print_number(file, r->error.relmse, 13, r->estimated);
+        pti_print_number(file, r->efficiency, 12, r->efficiency > 0);
+        if (truth) pti_print_number(file, r->true_error.rmse, 12, 1);
+        if (truth) pti_print_number(file, r->true_error.relmse, 13, 1);
+        fputc('\n', file);
+    }
+    fprintf(file, "stopped by %s at %lu samples per pixel; %lu contributions were not finite\n",
+            report->stopped_by ? report->stopped_by : "nothing", (unsigned long)report->spp, (unsigned long)report->nonfinite);
+    if (report->wall_resolution > 1e-3) fprintf(file, "this build sees a wall clock of whole seconds only\n");
+}
+
+#endif
+
+#if PTI_HAS_FILES && PTI_HAS_REPORT
+
+static void pti_write_real(pti_writer *w, double x)
+{
+    char text[40] = "";
+    pti_append_real(text, sizeof text, x);
+    pti_write_text(w, text);
+}
+
+PTDEF pt_result pt_report_write_csv(const pt_report *report, const char *path)
+{
+    pti_writer w;
+    uint32_t i;
+    int k;
+    if (!pti_writer_open(&w, path)) return PT_ERROR_FILE;
+    pti_write_text(&w, "method,sampler,width,height,threads,spp,cpu_seconds,wall_seconds,rays,rmse,relmse,relmse_001,"
+                       "efficiency,true_rmse,true_relmse,true_relmse_001\n");
+    for (i = 0; i < report->row_count; i++) {
+        const pt_report_row *r = &report->rows[i];
+        double v[14];
+        v[0] = report->width; v[1] = report->height; v[2] = report->threads;
+        v[3] = r->spp; v[4] = r->cpu_seconds; v[5] = r->wall_seconds; v[6] = (double)r->rays;
+        v[7] = r->error.rmse; v[8] = r->error.relmse; v[9] = r->error.relmse_001; v[10] = r->efficiency;
+        v[11] = r->true_error.rmse; v[12] = r->true_error.relmse; v[13] = r->true_error.relmse_001;
+        pti_write_text(&w, report->method);
+        pti_write_text(&w, ",");
+        pti_write_text(&w, report->sampler);
+        for (k = 0; k < 14; k++) {
+            char count[24] = "";
+            pti_write_text(&w, ",");
+            if ((k >= 7 && k < 10 && !r->estimated) || (k == 10 && !(r->efficiency > 0)) || (k > 10 && !r->has_true_error)) continue;
+            if (k < 4 || k == 6) { /* counts keep all their digits */
+                pti_append_integer(count, sizeof count, k == 6 ? r->rays : (uint64_t)v[k]);
+                pti_write_text(&w, count);
+            } else {
+                pti_write_real(&w, v[k]);
+            }
+        }
+        pti_write_text(&w, "\n");
+    }
+    return pti_writer_close(&w, path);
+}
+
+/* --- SVG: error against CPU seconds on log-log axes --- */
+
+/* Decades shown, and where they lie in the picture. */
+typedef struct pti_axes {
+    double x0, x1, y0, y1;  /* log10 of the ends                                                           */
+} pti_axes;
+
+enum { PTI_SVG_W = 640, PTI_SVG_H = 440, PTI_SVG_LEFT = 70, PTI_SVG_RIGHT = 150, PTI_SVG_TOP = 40, PTI_SVG_BOTTOM = 55 };
+
+static double pti_svg_x(const pti_axes *a, double log_x)
+{
+    return PTI_SVG_LEFT + (log_x - a->x0) / (a->x1 - a->x0) * (PTI_SVG_W - PTI_SVG_LEFT - PTI_SVG_RIGHT);
+}
+static double pti_svg_y(const pti_axes *a, double log_y)
+{
+    return PTI_SVG_H - PTI_SVG_BOTTOM - (log_y - a->y0) / (a->y1 - a->y0) * (PTI_SVG_H - PTI_SVG_TOP - PTI_SVG_BOTTOM);
+}
+
+/* The point of a row: log10 of CPU seconds and of the square root of relmse; 0 = not known. */
+static int pti_svg_point(const pt_report_row *r, double *x, double *y)
+{
+    double e = r->has_true_error ? r->true_error.relmse : r->estimated ? r->error.relmse : 0;
+    if (!(r->cpu_seconds > 0 && e > 0)) return 0;
+    *x = log10(r->cpu_seconds);
+    *y = 0.5 * log10(e);
+    return 1;
+}
+
+static pti_axes pti_svg_axes(const pt_report *const *reports, int count)
+{
+    pti_axes a;
+    double x, y;
+    uint32_t i;
+    int k;
+    a.x0 = a.y0 = HUGE_VAL;
+    a.x1 = a.y1 = -HUGE_VAL;
+    for (k = 0; k < count; k++)
+        for (i = 0; i < reports[k]->row_count; i++) {
+            if (!pti_svg_point(&reports[k]->rows[i], &x, &y)) continue;
+            a.x0 = fmin(a.x0, x);
+            a.x1 = fmax(a.x1, x);
+            a.y0 = fmin(a.y0, y);
+            a.y1 = fmax(a.y1, y);
+        }
+    if (!(a.x1 >= a.x0)) a.x0 = a.y0 = a.x1 = a.y1 = 0;
+    a.x0 = floor(a.x0); /* whole decades */
+    a.y0 = floor(a.y0);
+    a.x1 = fmax(a.x0 + 1, ceil(a.x1));
+    a.y1 = fmax(a.y0 + 1, ceil(a.y1));
+    return a;
+}
+
+static void pti_svg_number(pti_writer *w, const char *before, double value)
+{
+    pti_write_text(w, before);
+    pti_write_real(w, floor(10 * value + 0.5) / 10);
+}
+
+static void pti_svg_line(pti_writer *w, double x0, double y0, double x1, double y1, const char *style)
+{
+    pti_svg_number(w, "<line x1=\"", x0);
+    pti_svg_number(w, "\" y1=\"", y0);
+    pti_svg_number(w, "\" x2=\"", x1);
+    pti_svg_number(w, "\" y2=\"", y1);
+    pti_write_text(w, "\" ");
+    pti_write_text(w, style);
+    pti_write_text(w, "/>\n");
+}
+
+static void pti_svg_escaped(pti_writer *w, const char *text)
+{
+    for (; *text; text++) {
+        if (*text == '<') pti_write_text(w, "&lt;");
+        else if (*text == '&') pti_write_text(w, "&amp;");
+        else pti_write(w, text, 1);
+    }
+}
+
+static void pti_svg_text(pti_writer *w, double x, double y, const char *anchor, const char *extra, const char *text)
+{
+    pti_svg_number(w, "<text x=\"", x);
+    pti_svg_number(w, "\" y=\"", y);
+    pti_write_text(w, "\" text-anchor=\"");
+    pti_write_text(w, anchor);
+    pti_write_text(w, "\" ");
+    pti_write_text(w, extra);
+    pti_write_text(w, ">");
+    pti_svg_escaped(w, text);
+    pti_write_text(w, "</text>\n");
+}
+
+static void pti_svg_grid(pti_writer *w, const pti_axes *a)
+{
+    double left = PTI_SVG_LEFT, right = PTI_SVG_W - PTI_SVG_RIGHT, top = PTI_SVG_TOP, bottom = PTI_SVG_H - PTI_SVG_BOTTOM, v;
+    for (v = a->x0; v <= a->x1; v++) {
+        char text[40] = "";
+        pti_append_real(text, sizeof text, pow(10, v));
+        pti_svg_line(w, pti_svg_x(a, v), top, pti_svg_x(a, v), bottom, "stroke=\"#ddd\"");
+        pti_svg_text(w, pti_svg_x(a, v), bottom + 18, "middle", "", text);
+    }
+    for (v = a->y0; v <= a->y1; v++) {
+        char text[40] = "";
+        pti_append_real(text, sizeof text, pow(10, v));
+        pti_svg_line(w, left, pti_svg_y(a, v), right, pti_svg_y(a, v), "stroke=\"#ddd\"");
+        pti_svg_text(w, left - 8, pti_svg_y(a, v) + 4, "end", "", text);
+    }
+    pti_svg_text(w, (left + right) / 2, PTI_SVG_H - 14, "middle", "", "CPU seconds");
+    pti_svg_text(w, 18, (top + bottom) / 2, "middle", "transform=\"rotate(-90 18 192)\"", "square root of relMSE");
+}
+
+/* A dashed line of slope -1/2 through (x, y), cut to the axes. */
+static void pti_svg_slope(pti_writer *w, const pti_axes *a, double x, double y)
+{
+    double x0 = fmax(a->x0, x - 2 * (a->y1 - y)), x1 = fmin(a->x1, x + 2 * (y - a->y0));
+    pti_svg_line(w, pti_svg_x(a, x0), pti_svg_y(a, y - 0.5 * (x0 - x)), pti_svg_x(a, x1), pti_svg_y(a, y - 0.5 * (x1 - x)),
+                 "stroke=\"#999\" stroke-dasharray=\"5 4\"");
+    pti_svg_text(w, pti_svg_x(a, x1) - 4, pti_svg_y(a, y - 0.5 * (x1 - x)) - 6, "end", "fill=\"#777\"", "slope -1/2");
+}
+
+static void pti_svg_curve(pti_writer *w, const pti_axes *a, const pt_report *r, const char *label, int k)
+{
+    static const char *const colours[8] = {"#1f77b4", "#d62728", "#2ca02c", "#ff7f0e", "#9467bd", "#17becf", "#8c564b", "#7f7f7f"};
+    double x, y;
+    uint32_t i;
+    char style[80] = "fill=\"";
+    pti_append(style, sizeof style, colours[k % 8]);
+    pti_append(style, sizeof style, "\"");
+    pti_write_text(w, "<polyline fill=\"none\" stroke-width=\"2\" stroke=\"");
+    pti_write_text(w, colours[k % 8]);
+    pti_write_text(w, "\" points=\"");
+    for (i = 0; i < r->row_count; i++)
+        if (pti_svg_point(&r->rows[i], &x, &y)) {
+            pti_svg_number(w, "", pti_svg_x(a, x));
+            pti_svg_number(w, ",", pti_svg_y(a, y));
+            pti_write_text(w, " ");
+        }
+    pti_write_text(w, "\"/>\n");
+    pti_svg_text(w, PTI_SVG_W - PTI_SVG_RIGHT + 12, PTI_SVG_TOP + 14 + 18 * k, "start", style, label);
+}
+
+PTDEF pt_result pt_report_write_svg(const pt_report *const *reports, const char *const *labels, int count,
+                                    const char *title, const char *path)
+{
+    pti_writer w;
+    pti_axes a;
+    double x = 0, y = 0;
+    uint32_t i;
+    int k, found = 0;
+    if (!reports || count < 1) return PT_ERROR_ARGUMENT;
+    if (!pti_writer_open(&w, path)) return PT_ERROR_FILE;
+    a = pti_svg_axes(reports, count);
+    pti_write_text(&w, "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"640\" height=\"440\" viewBox=\"0 0 640 440\" "
+                       "font-family=\"sans-serif\" font-size=\"13\">\n<rect width=\"640\" height=\"440\" fill=\"#fff\"/>\n");
+    pti_svg_text(&w, PTI_SVG_LEFT, 24, "start", "font-size=\"16\"", title ? title : "error against run time");
+    pti_svg_grid(&w, &a);
+    for (i = 0; i < reports[0]->row_count && !found; i++) found = pti_svg_point(&reports[0]->rows[i], &x, &y);
+    if (found) pti_svg_slope(&w, &a, x, y);
+    for (k = 0; k < count; k++) {
+        const char *label = labels && labels[k] ? labels[k] : reports[k]->method;
+        pti_svg_curve(&w, &a, reports[k], label ? label : "", k);
+    }
+    pti_write_text(&w, "</svg>\n");
+    return pti_writer_close(&w, path);
+}
+
+#endif /* PTI_HAS_FILES && PTI_HAS_REPORT */
+
+/* =====================================================================================================
+   [PT-19] CANONICAL SCENES: implementation
+   =====================================================================================================
+   Scenes with a known answer, or known to everybody. Each function says where its numbers come from. */
+
+#if PTI_HAS_SCENES
+
+/* --- the Cornell box: Cornell University Program of Computer Graphics, Cornell Box Data --- */
+
+/* Measured reflectances, 400 to 700 nm in steps of 4 nm: white, green, red. */
+#define PTI_WALL_COUNT 76
+static const double pti_walls[3][PTI_WALL_COUNT] = {
+    {0.343, 0.445, 0.551, 0.624, 0.665, 0.687, 0.708, 0.723, 0.715, 0.710, 0.745, 0.758, 0.739, 0.767,
+     0.777, 0.765, 0.751, 0.745, 0.748, 0.729, 0.745, 0.757, 0.753, 0.750, 0.746, 0.747, 0.735, 0.732,
+     0.739, 0.734, 0.725, 0.721, 0.733, 0.725, 0.732, 0.743, 0.744, 0.748, 0.728, 0.716, 0.733, 0.726,
+     0.713, 0.740, 0.754, 0.764, 0.752, 0.736, 0.734, 0.741, 0.740, 0.732, 0.745, 0.755, 0.751, 0.744,
+     0.731, 0.733, 0.744, 0.731, 0.712, 0.708, 0.729, 0.730, 0.727, 0.707, 0.703, 0.729, 0.750, 0.760,
+     0.751, 0.739, 0.724, 0.730, 0.740, 0.737},
+    {0.092, 0.096, 0.098, 0.097, 0.098, 0.095, 0.095, 0.097, 0.095, 0.094, 0.097, 0.098, 0.096, 0.101,
+     0.103, 0.104, 0.107, 0.109, 0.112, 0.115, 0.125, 0.140, 0.160, 0.187, 0.229, 0.285, 0.343, 0.390,
+     0.435, 0.464, 0.472, 0.476, 0.481, 0.462, 0.447, 0.441, 0.426, 0.406, 0.373, 0.347, 0.337, 0.314,
+     0.285, 0.277, 0.266, 0.250, 0.230, 0.207, 0.186, 0.171, 0.160, 0.148, 0.141, 0.136, 0.130, 0.126,
+     0.123, 0.121, 0.122, 0.119, 0.114, 0.115, 0.117, 0.117, 0.118, 0.120, 0.122, 0.128, 0.132, 0.139,
+     0.144, 0.146, 0.150, 0.152, 0.157, 0.159},
+    {0.040, 0.046, 0.048, 0.053, 0.049, 0.050, 0.053, 0.055, 0.057, 0.056, 0.059, 0.057, 0.061, 0.061,
+     0.060, 0.062, 0.062, 0.062, 0.061, 0.062, 0.060, 0.059, 0.057, 0.058, 0.058, 0.058, 0.056, 0.055,
+     0.056, 0.059, 0.057, 0.055, 0.059, 0.059, 0.058, 0.059, 0.061, 0.061, 0.063, 0.063, 0.067, 0.068,
+     0.072, 0.080, 0.090, 0.099, 0.124, 0.154, 0.192, 0.255, 0.287, 0.349, 0.402, 0.443, 0.487, 0.513,
+     0.558, 0.584, 0.620, 0.606, 0.609, 0.651, 0.612, 0.610, 0.650, 0.638, 0.627, 0.620, 0.630, 0.628,
+     0.642, 0.639, 0.657, 0.639, 0.635, 0.642}
+};
+
+PTDEF pt_spectrum pt_cornell_spectrum(const char *name)
+{
+    static const double wall_nm[PTI_WALL_COUNT] = {
+        400, 404, 408, 412, 416, 420, 424, 428, 432, 436, 440, 444, 448, 452, 456, 460, 464, 468, 472,
+        476, 480, 484, 488, 492, 496, 500, 504, 508, 512, 516, 520, 524, 528, 532, 536, 540, 544, 548,
+        552, 556, 560, 564, 568, 572, 576, 580, 584, 588, 592, 596, 600, 604, 608, 612, 616, 620, 624,
+        628, 632, 636, 640, 644, 648, 652, 656, 660, 664, 668, 672, 676, 680, 684, 688, 692, 696, 700
+    };
+    static const double lamp_nm[4] = {400, 500, 600, 700}, lamp[4] = {0, 8, 15.6, 18.4};
+    static const char *const names[3] = {"white", "green", "red"};
+    pt_spectrum s;
+    int k;
+    s.nm = lamp_nm;
+    s.value = lamp;
+    s.count = 4;
+    s.zero_outside = 1;
+    for (k = 0; k < 3; k++)
+        if (strcmp(name, names[k]) == 0) {
+            s.nm = wall_nm;
+            s.value = pti_walls[k];
+            s.count = PTI_WALL_COUNT;
+            s.zero_outside = 0;
+        }
+    return s;
+}
+
+PTDEF pt_rgb pt_cornell_rgb(const char *name)
+{
+    /* Light to RGB as emission, walls to the RGB they have under D65: a renderer of three bands multiplies
+       those, which is close to, but not the same as, multiplying spectra. */
+    pt_spectrum s = pt_cornell_spectrum(name);
+    pt_rgbd c = s.zero_outside ? pt_emission_to_rgb(&s) : pt_reflectance_to_rgb(&s);
+    return pt_rgb3((pt_real)c.r, (pt_real)c.g, (pt_real)c.b);
+}
+
+/* The 16 quads in mm: four corners, and the wall they are made of (0 white, 1 green, 2 red, 3 lamp). Not all
+   are parallelograms, and the red wall is not even flat: each is two triangles. The lamp is lowered from the
+   ceiling's 548.8 to 548.79, where it would coincide with it. */
+typedef struct pti_cornell_quad {
+    pt_real v[12];
+    int wall;
+} pti_cornell_quad;
+
+#define PTI_CORNELL_ROOM 6
+static const pti_cornell_quad pti_cornell_quads[16] = {
+    {{PTI_R(552.8), 0, 0, 0, 0, 0, 0, 0, PTI_R(559.2), PTI_R(549.6), 0, PTI_R(559.2)}, 0},
+    {{343, PTI_R(548.79), 227, 343, PTI_R(548.79), 332, 213, PTI_R(548.79), 332, 213, PTI_R(548.79), 227}, 3},
+    {{556, PTI_R(548.8), 0, 556, PTI_R(548.8), PTI_R(559.2), 0, PTI_R(548.8), PTI_R(559.2), 0, PTI_R(548.8), 0}, 0},
+    {{PTI_R(549.6), 0, PTI_R(559.2), 0, 0, PTI_R(559.2), 0, PTI_R(548.8), PTI_R(559.2), 556, PTI_R(548.8), PTI_R(559.2)}, 0},
+    {{0, 0, PTI_R(559.2), 0, 0, 0, 0, PTI_R(548.8), 0, 0, PTI_R(548.8), PTI_R(559.2)}, 1},
+    {{PTI_R(552.8), 0, 0, PTI_R(549.6), 0, PTI_R(559.2), 556, PTI_R(548.8), PTI_R(559.2), 556, PTI_R(548.8), 0}, 2},
+    {{130, 165, 65, 82, 165, 225, 240, 165, 272, 290, 165, 114}, 0},
+    {{290, 0, 114, 290, 165, 114, 240, 165, 272, 240, 0, 272}, 0},
+    {{130, 0, 65, 130, 165, 65, 290, 165, 114, 290, 0, 114}, 0},
+    {{82, 0, 225, 82, 165, 225, 130, 165, 65, 130, 0, 65}, 0},
+    {{240, 0, 272, 240, 165, 272, 82, 165, 225, 82, 0, 225}, 0},
+    {{423, 330, 247, 265, 330, 296, 314, 330, 456, 472, 330, 406}, 0},
+    {{423, 0, 247, 423, 330, 247, 472, 330, 406, 472, 0, 406}, 0},
+    {{472, 0, 406, 472, 330, 406, 314, 330, 456, 314, 0, 456}, 0},
+    {{314, 0, 456, 314, 330, 456, 265, 330, 296, 265, 0, 296}, 0},
+    {{265, 0, 296, 265, 330, 296, 423, 330, 247, 423, 0, 247}, 0}
+};
+
+static pt_vec3 pti_at(const pt_real *v)
+{
+    return pt_v3(v[0], v[1], v[2]);
+}
+
+/* The first `count` quads, and the camera. */
+static void pti_cornell_build(pt_scene *scene, pt_camera *camera, int count)
+{
+    int material[4], i;
+    pt_material lamp = pt_material_diffuse(pt_rgb_grey(PTI_R(0.78)));
+    lamp.emission = pt_cornell_rgb("lamp");
+    material[0] = pt_add_material(scene, pt_material_diffuse(pt_cornell_rgb("white")));
+    material[1] = pt_add_material(scene, pt_material_diffuse(pt_cornell_rgb("green")));
+    material[2] = pt_add_material(scene, pt_material_diffuse(pt_cornell_rgb("red")));
+    material[3] = pt_add_material(scene, lamp);
+    for (i = 0; i < count; i++) {
+        const pti_cornell_quad *q = &pti_cornell_quads[i];
+        pt_add_quad(scene, pti_at(q->v), pti_at(q->v + 3), pti_at(q->v + 6), pti_at(q->v + 9), material[q->wall]);
+    }
+    /* film 25 mm square behind a lens of 35 mm */
+    *camera = pt_camera_look_at(pt_v3(278, 273, -800), pt_v3(278, 273, 0), pt_v3(0, 1, 0),
+                                (pt_real)(2 * atan(0.5 * 0.025 / 0.035) * 180 / PT_PI));
+}
+
+PTDEF pt_result pt_scene_cornell(pt_scene *scene, pt_camera *camera)
+{
+    pti_cornell_build(scene, camera, 16);
+    return pt_commit(scene);
+}
+
+PTDEF pt_result pt_scene_cornell_empty(pt_scene *scene, pt_camera *camera)
+{
+    pti_cornell_build(scene, camera, PTI_CORNELL_ROOM);
+    return pt_commit(scene);
+}
+
+PTDEF pt_result pt_scene_cornell_spheres(pt_scene *scene, pt_camera *camera)
+{
+    pti_cornell_build(scene, camera, PTI_CORNELL_ROOM);
+    pt_add_sphere(scene, pt_v3(390, 100, 370), 100, pt_add_material(scene, pt_material_mirror(pt_rgb_grey(PTI_R(0.98)))));
+    pt_add_sphere(scene, pt_v3(165, 100, 190), 100, pt_add_material(scene, pt_material_dielectric(PTI_R(1.5))));
+    return pt_commit(scene);
+}
+
+/* --- scenes with closed forms --- */
+
+PTDEF pt_result pt_scene_furnace(pt_scene *scene, pt_camera *camera)
+{
+    pt_material wall = pt_material_diffuse(pt_rgb_grey(PTI_R(0.5)));
+    int m, k;
+    wall.emission = pt_rgb_grey(1);
+    m = pt_add_material(scene, wall);
+    for (k = 0; k < 6; k++) { /* axis k % 3, side k / 3; edge1 x edge2 points inwards */
+        pt_real side = k < 3 ? PTI_R(-0.5) : PTI_R(0.5), c[3], a[3] = {0, 0, 0}, b[3] = {0, 0, 0};
+        int axis = k % 3;
+        c[0] = c[1] = c[2] = PTI_R(-0.5);
+        c[axis] = side;
+        a[(axis + (k < 3 ? 1 : 2)) % 3] = 1;
+        b[(axis + (k < 3 ? 2 : 1)) % 3] = 1;
+        pt_add_parallelogram(scene, pti_at(c), pti_at(a), pti_at(b), m);
+    }
+    *camera = pt_camera_look_at(pt_v3(0, 0, PTI_R(0.4)), pt_v3(0, 0, -1), pt_v3(0, 1, 0), 60);
+    return pt_commit(scene);
+}
+
+PTDEF pt_result pt_scene_diffuse_sphere(pt_scene *scene, pt_camera *camera)
+{
+    int m = pt_add_material(scene, pt_material_diffuse(pt_rgb_grey(PTI_R(0.5))));
+    pt_add_sphere(scene, pt_v3(0, 0, 0), 1, m);
+    pt_add_point_light(scene, pt_v3(PTI_R(0.6), PTI_R(0.2), PTI_R(-0.3)), pt_rgb_grey((pt_real)(1 / (4 * PT_PI))));
+    *camera = pt_camera_look_at(pt_v3(0, 0, PTI_R(0.9)), pt_v3(PTI_R(0.3), 0, -1), pt_v3(0, 1, 0), 70);
+    return pt_commit(scene);
+}
+
+PTDEF pt_result pt_scene_glass_ball(pt_scene *scene, pt_camera *camera)
+{
+    int floor_material = pt_add_material(scene, pt_material_diffuse(pt_rgb_grey(PTI_R(0.8))));
+    int glass = pt_add_material(scene, pt_material_dielectric(PTI_R(1.5)));
+    int lamp = pt_add_material(scene, pt_material_emitter(pt_rgb_grey(200)));
+    pt_add_parallelogram(scene, pt_v3(-4, 0, -4), pt_v3(0, 0, 8), pt_v3(8, 0, 0), floor_material);
+    pt_add_sphere(scene, pt_v3(0, PTI_R(0.5), 0), PTI_R(0.4), glass);
+    pt_add_sphere(scene, pt_v3(PTI_R(1.5), 3, 0), PTI_R(0.1), lamp);
+    *camera = pt_camera_look_at(pt_v3(0, PTI_R(1.2), PTI_R(3.2)), pt_v3(0, PTI_R(0.3), 0), pt_v3(0, 1, 0), 40);
+    return pt_commit(scene);
+}
+
+/* K. Beason, smallpt. Its eye is outside the box: rays start at 140 along the view, behind the front wall. The
+   picture is 0.5135 high at distance 1. */
+PTDEF pt_result pt_scene_smallpt(pt_scene *scene, pt_camera *camera)
+{
+    static const struct {
+        double x, y, z, r, red, green, blue;
+        int kind; /* 0 diffuse, 1 mirror, 2 glass, 3 lamp */
+    } s[9] = {{1e5 + 1, 40.8, 81.6, 1e5, 0.75, 0.25, 0.25, 0},  {-1e5 + 99, 40.8, 81.6, 1e5, 0.25, 0.25, 0.75, 0},
+              {50, 40.8, 1e5, 1e5, 0.75, 0.75, 0.75, 0},        {50, 40.8, -1e5 + 170, 1e5, 0, 0, 0, 0},
+              {50, 1e5, 81.6, 1e5, 0.75, 0.75, 0.75, 0},        {50, -1e5 + 81.6, 81.6, 1e5, 0.75, 0.75, 0.75, 0},
+              {27, 16.5, 47, 16.5, 0.999, 0.999, 0.999, 1},     {73, 16.5, 78, 16.5, 0.999, 0.999, 0.999, 2},
+              {50, 681.6 - 0.27, 81.6, 600, 12, 12, 12, 3}};
+    pt_vec3 eye = pt_v3(50, 52, PTI_R(295.6)), d = pt_v3(0, PTI_R(-0.042612), -1);
+    int i;
+    for (i = 0; i < 9; i++) {
+        pt_rgb c = pt_rgb3((pt_real)s[i].red, (pt_real)s[i].green, (pt_real)s[i].blue);
+        pt_material m = s[i].kind == 1   ? pt_material_mirror(c)
+                        : s[i].kind == 2 ? pt_material_dielectric(PTI_R(1.5))
+                        : s[i].kind == 3 ? pt_material_emitter(c)
+                                         : pt_material_diffuse(c);
+        pt_add_sphere(scene, pt_v3((pt_real)s[i].x, (pt_real)s[i].y, (pt_real)s[i].z), (pt_real)s[i].r,
+                      pt_add_material(scene, m));
+    }
+    *camera = pt_camera_look_at(eye, pt_v3_add(eye, d), pt_v3(0, 1, 0), (pt_real)(2 * atan(0.5 * 0.5135) * 180 / PT_PI));
+    camera->near_distance = 140;
+    return pt_commit(scene);
+}
+
+PTDEF const pt_scene_entry *pt_scenes(int *count)
+{
+    static const pt_scene_entry scenes[] = {
+        {"cornell", "the Cornell box from its measured data", pt_scene_cornell},
+        {"cornell-empty", "the Cornell box without its blocks", pt_scene_cornell_empty},
+        {"cornell-spheres", "the Cornell box with a mirror and a glass sphere", pt_scene_cornell_spheres},
+        {"furnace", "closed box, emission 1, albedo 1/2: radiance 2", pt_scene_furnace},
+        {"diffuse-sphere", "point light in a diffuse sphere: uniform indirect light", pt_scene_diffuse_sphere},
+        {"glass-ball", "caustic of a glass ball under a small lamp", pt_scene_glass_ball},
+        {"smallpt", "smallpt's box: walls are spheres of radius 1e5", pt_scene_smallpt},
+    };
+    *count = (int)(sizeof scenes / sizeof scenes[0]);
+    return scenes;
+}
+
+PTDEF const pt_scene_entry *pt_scene_find(const char *name)
+{
+    int count, i;
+    const pt_scene_entry *s = pt_scenes(&count);
+    for (i = 0; name && i < count; i++)
+        if (strcmp(s[i].name, name) == 0) return &s[i];
+    return NULL;
+}
+
+#endif /* PTI_HAS_SCENES */
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif /* PATHTRACER_IMPLEMENTATION */
+
+/*
+   VERSION HISTORY
+
+   0.1.0 (2026-11-22)  first version: path tracing (plain, light sampling, MIS) of diffuse, mirror and glass
+                       surfaces under area, point and constant environment lights; four samplers; error
+                       against run time in every report; Cornell box and six more scenes.
+
+   LICENCE: this software is available under two licences; choose the one you prefer.
+
+   A. MIT No Attribution (MIT-0)
+
+   Permission is hereby granted, free of charge, to any person obtaining a copy of this software and associated
+   documentation files (the "Software"), to deal in the Software without restriction, including without
+   limitation the rights to use, copy, modify, merge, publish, distribute, sublicense, and/or sell copies of the
+   Software, and to permit persons to whom the Software is furnished to do so.
+
+   THE SOFTWARE IS PROVIDED "AS IS", WITHOUT WARRANTY OF ANY KIND, EXPRESS OR IMPLIED, INCLUDING BUT NOT LIMITED
+   TO THE WARRANTIES OF MERCHANTABILITY, FITNESS FOR A PARTICULAR PURPOSE AND NONINFRINGEMENT. IN NO EVENT SHALL
+   THE AUTHORS OR COPYRIGHT HOLDERS BE LIABLE FOR ANY CLAIM, DAMAGES OR OTHER LIABILITY, WHETHER IN AN ACTION OF
+   CONTRACT, TORT OR OTHERWISE, ARISING FROM, OUT OF OR IN CONNECTION WITH THE SOFTWARE OR THE USE OR OTHER
+   DEALINGS IN THE SOFTWARE.
+
+   B. Public domain
+
+   This is free and unencumbered software released into the public domain. Anyone is free to copy, modify,
+   publish, use, compile, sell, or distribute this software, either in source code form or as a compiled binary,
+   for any purpose, commercial or non-commercial, and by any means.
+
+   The Sobol direction numbers of two dimensions in [PT-02] follow S. Joe and F. Y. Kuo (new-joe-kuo-6), whose
+   notice reads: Copyright (c) 2008, Frances Y. Kuo and Stephen Joe. All rights reserved. Redistribution and
+   use in source and binary forms, with or without modification, are permitted under the three-clause BSD
+   conditions; provided as is, without warranty.
+*/
