@@ -1105,7 +1105,8 @@ typedef struct pt_li_options {
     pt_real roulette_survival;  /* PT_ROULETTE_CONSTANT: in (0, 1); 0 = 0.8                                */
     int roulette_start;         /* edges before the first roulette, >= 1; 0 = 1 if constant, else 3        */
     pt_heuristic heuristic;     /* of multiple importance sampling                                         */
-    const volatile int *cancel; /* when it becomes non-zero, long paths end (NULL = never)                 */
+    int (*poll)(void *user);    /* asked every 2^16 edges of a path; non-zero ends it (NULL = never)       */
+    void *poll_user;
 #if PTI_HAS_OBSERVER
     pt_observer observer;       /* NULL = none. Called from the rendering threads                          */
     void *observer_user;
@@ -1116,7 +1117,7 @@ typedef struct pt_li_options {
 typedef struct pt_li_info {
     uint64_t rays;              /* rays traced, shadow rays included (added to)                            */
     int edges;                  /* edges of the path, shadow edges not counted                             */
-    int cancelled;              /* 1: ended by *cancel; the result means nothing                           */
+    int cancelled;              /* 1: ended by poll; the result means nothing                                 */
     int hit;                    /* 1: the first ray met a surface, and these are set:                      */
     pt_rgb albedo;
     pt_vec3 normal;
@@ -1391,6 +1392,15 @@ static void pti_fence(double *x)
     volatile double v = *x;
     *x = v;
 }
+#endif
+
+/* A flag that threads share. */
+#if defined(__GNUC__)
+#define PTI_LOAD(p) __atomic_load_n(p, __ATOMIC_RELAXED)
+#define PTI_STORE(p, v) __atomic_store_n(p, v, __ATOMIC_RELAXED)
+#else
+#define PTI_LOAD(p) (*(volatile int *)(p))
+#define PTI_STORE(p, v) (*(volatile int *)(p) = (v))
 #endif
 
 PTDEF const char *pt_result_string(pt_result result)
@@ -2710,8 +2720,8 @@ static pti_ray pti_ray_make(const pt_ray *ray)
         r.ky = k;
     }
     r.sz = 1 / r.d[r.kz];
-    r.sx = r.d[r.kx] / r.d[r.kz];
-    r.sy = r.d[r.ky] / r.d[r.kz];
+    r.sx = r.d[r.kx] * r.sz;
+    r.sy = r.d[r.ky] * r.sz;
     return r;
 }
 
@@ -4345,10 +4355,11 @@ PTDEF pt_result pt_commit(pt_scene *scene)
 {
     if (scene->error != PT_OK) return scene->error;
     pti_uncommit(scene);
+    scene->error_text[0] = 0;
     if (!pti_commit_primitives(scene) || !pti_commit_tree(scene) || !pti_commit_lights(scene)) {
         pti_uncommit(scene);
-        pti_scene_no_memory(scene, "commit of primitives, number", 0);
-        return scene->error;
+        pti_append(scene->error_text, sizeof scene->error_text, "pt_commit: out of memory");
+        return PT_ERROR_MEMORY; /* the scene itself is whole: it may be committed again */
     }
     scene->needs = pti_find_needs(scene);
     scene->committed = 1;
@@ -4357,7 +4368,7 @@ PTDEF pt_result pt_commit(pt_scene *scene)
 
 PTDEF const char *pt_scene_error(const pt_scene *scene)
 {
-    return scene->error == PT_OK ? pt_result_string(PT_OK) : scene->error_text;
+    return scene->error_text[0] ? scene->error_text : pt_result_string(PT_OK);
 }
 
 PTDEF unsigned pt_scene_needs(const pt_scene *scene)
@@ -4798,14 +4809,6 @@ enum {
     PTI_WITH_ALL = 7
 };
 
-#if defined(__GNUC__)
-#define PTI_LOAD(p) __atomic_load_n(p, __ATOMIC_RELAXED)
-#define PTI_STORE(p, v) __atomic_store_n(p, v, __ATOMIC_RELAXED)
-#else
-#define PTI_LOAD(p) (*(p))
-#define PTI_STORE(p, v) (*(p) = (v))
-#endif
-
 /* A walk under way. */
 typedef struct pti_walk {
     const pt_scene *scene;
@@ -5015,7 +5018,7 @@ PTI_INLINE pt_rgbd pti_path(const pt_scene *scene, const pt_ray *ray, pt_sampler
         bsdf = pt_bsdf_make(&scene->materials[w.hit.material], &w.hit);
         if (technique != PTI_TECHNIQUE_PLAIN) pti_direct(&w, &bsdf, wo, features, technique);
         if (!pti_extend(&w, &bsdf, wo, features) || !pti_roulette(&w)) break;
-        if ((w.edges & 0xffff) == 0 && options->cancel && PTI_LOAD(options->cancel)) {
+        if ((w.edges & 0xffff) == 0 && options->poll && options->poll(options->poll_user)) {
             info->cancelled = 1;
             break;
         }
@@ -5025,30 +5028,37 @@ PTI_INLINE pt_rgbd pti_path(const pt_scene *scene, const pt_ray *ray, pt_sampler
     return w.sum;
 }
 
-PTDEF pt_rgbd pt_li_path(const pt_scene *scene, const pt_ray *ray, pt_sampler *sampler, const pt_li_options *options,
-                         pt_li_info *info)
+/* The general instance; the technique is asked at run time, which costs nothing next to a ray. */
+static pt_rgbd pti_path_general(const pt_scene *scene, const pt_ray *ray, pt_sampler *sampler,
+                                const pt_li_options *options, pt_li_info *info, int technique)
 {
-    return pti_path(scene, ray, sampler, options, info, PTI_WITH_ALL, PTI_TECHNIQUE_MIS);
+    return pti_path(scene, ray, sampler, options, info, PTI_WITH_ALL, technique);
 }
 
 /* The instance for scenes that are diffuse throughout, without environment and observer. */
-static pt_rgbd pti_li_path_diffuse(const pt_scene *scene, const pt_ray *ray, pt_sampler *sampler,
-                                   const pt_li_options *options, pt_li_info *info)
+static pt_rgbd pti_path_diffuse(const pt_scene *scene, const pt_ray *ray, pt_sampler *sampler,
+                                const pt_li_options *options, pt_li_info *info)
 {
     return pti_path(scene, ray, sampler, options, info, 0, PTI_TECHNIQUE_MIS);
+}
+
+PTDEF pt_rgbd pt_li_path(const pt_scene *scene, const pt_ray *ray, pt_sampler *sampler, const pt_li_options *options,
+                         pt_li_info *info)
+{
+    return pti_path_general(scene, ray, sampler, options, info, PTI_TECHNIQUE_MIS);
 }
 
 #if PTI_HAS_ALL_METHODS
 PTDEF pt_rgbd pt_li_path_plain(const pt_scene *scene, const pt_ray *ray, pt_sampler *sampler,
                                const pt_li_options *options, pt_li_info *info)
 {
-    return pti_path(scene, ray, sampler, options, info, PTI_WITH_ALL, PTI_TECHNIQUE_PLAIN);
+    return pti_path_general(scene, ray, sampler, options, info, PTI_TECHNIQUE_PLAIN);
 }
 
 PTDEF pt_rgbd pt_li_path_light(const pt_scene *scene, const pt_ray *ray, pt_sampler *sampler,
                                const pt_li_options *options, pt_li_info *info)
 {
-    return pti_path(scene, ray, sampler, options, info, PTI_WITH_ALL, PTI_TECHNIQUE_LIGHT);
+    return pti_path_general(scene, ray, sampler, options, info, PTI_TECHNIQUE_LIGHT);
 }
 #endif
 
@@ -5224,42 +5234,19 @@ static void pti_deflate(pti_bits *b, const unsigned char *data, size_t size, siz
     if (b->count > 0) pti_put_bits(b, 0, 8 - b->count);
 }
 
-/* PNG filters 1 (Sub), 2 (Up) and 4 (Paeth) of one byte; a left, p above, c above left. */
-static unsigned char pti_png_filter(int type, int x, int a, int p, int c)
-{
-    int guess = a + p - c, da, dp, dc, paeth;
-    if (type == 1) return (unsigned char)(x - a);
-    if (type == 2) return (unsigned char)(x - p);
-    da = guess > a ? guess - a : a - guess;
-    dp = guess > p ? guess - p : p - guess;
-    dc = guess > c ? guess - c : c - guess;
-    paeth = da <= dp && da <= dc ? a : dp <= dc ? p : c;
-    return (unsigned char)(x - paeth);
-}
-
-/* One row with the filter whose output is smallest as signed bytes; out: type and 3 * width bytes. */
+/* One row through PNG filter 4: each byte less the neighbour (left a, above p, above left c) that is nearest
+   to a + p - c (Paeth). out: the filter's number and 3 * width bytes. */
 static void pti_png_row(const unsigned char *rgb, int width, int y, unsigned char *out)
 {
-    static const int types[3] = {1, 2, 4};
     size_t stride = 3 * (size_t)width, k;
     const unsigned char *row = rgb + (size_t)y * stride;
-    uint64_t best = UINT64_MAX;
-    int pass, chosen = 1, t;
-    for (pass = 0; pass < 4; pass++) {
-        uint64_t sum = 0;
-        t = pass < 3 ? types[pass] : chosen;
-        for (k = 0; k < stride; k++) {
-            unsigned char v = pti_png_filter(t, row[k], k < 3 ? 0 : row[k - 3], y == 0 ? 0 : row[k - stride],
-                                             y == 0 || k < 3 ? 0 : row[k - stride - 3]);
-            out[1 + k] = v;
-            sum += v < 128 ? v : 256u - v;
-        }
-        if (sum < best) {
-            best = sum;
-            chosen = t;
-        }
+    out[0] = 4;
+    for (k = 0; k < stride; k++) {
+        int a = k < 3 ? 0 : row[k - 3], p = y == 0 ? 0 : row[k - stride], c = y == 0 || k < 3 ? 0 : row[k - stride - 3];
+        int da = p > c ? p - c : c - p, dp = a > c ? a - c : c - a, dc = a + p - 2 * c;
+        if (dc < 0) dc = -dc;
+        out[1 + k] = (unsigned char)(row[k] - (da <= dp && da <= dc ? a : dp <= dc ? p : c));
     }
-    out[0] = (unsigned char)chosen;
 }
 
 static uint32_t pti_crc32(uint32_t crc, const unsigned char *data, size_t size)
@@ -5444,7 +5431,7 @@ static pt_li_fn pti_pick_instance(const pt_method *method, const pt_scene *scene
     *body = "general";
     if (method->li != pt_li_path || desc->general_body || observed || (scene->needs & ~diffuse)) return method->li;
     *body = "diffuse";
-    return pti_li_path_diffuse;
+    return pti_path_diffuse;
 }
 
 PTDEF const char *pt_sampler_name(pt_sampler_kind kind)
@@ -5563,7 +5550,8 @@ typedef struct pti_pass {
     uint32_t planned;       /* samples a half (stratified)                                                 */
     int tile, columns, tiles;
     uint64_t *rays, *nonfinite; /* a slot for each tile                                                    */
-    int cancel;
+    double cpu_start;
+    int cancel;             /* 1: the user wants to stop, 2: a path outlasted the time budget              */
     /* progress, under the lock */
 #if PTI_HAS_THREADS
     pti_mutex lock;
@@ -5610,6 +5598,7 @@ static void pti_render_sample(pti_pass *p, pt_sampler *sampler, int x, int y, ui
     info.rays = 0;
     L = p->li(p->scene, &ray, sampler, &p->options, &info);
     *rays += info.rays;
+    if (info.cancelled) return; /* and with it the whole pass */
     if (pti_finite(L.r) && pti_finite(L.g) && pti_finite(L.b)) {
         sum[0] += L.r;
         sum[1] += L.g;
@@ -5647,6 +5636,17 @@ static void pti_report_progress(pti_pass *p)
         if (now.seconds_left < 0 || left < now.seconds_left) now.seconds_left = left;
     }
     if (p->desc->progress(p->desc->progress_user, &now)) PTI_STORE(&p->cancel, 1);
+}
+
+/* Asked from inside long paths: is it time to give up this pass? */
+static int pti_poll(void *context)
+{
+    pti_pass *p = (pti_pass *)context;
+    const pt_render_desc *d = p->desc;
+    if (d->li.poll && d->li.poll(d->li.poll_user)) PTI_STORE(&p->cancel, 1);
+    if (d->seconds > 0 && pt_wall_seconds() - p->start >= d->seconds) PTI_STORE(&p->cancel, 2);
+    if (d->cpu_seconds > 0 && pt_cpu_seconds() - p->cpu_start >= d->cpu_seconds) PTI_STORE(&p->cancel, 2);
+    return PTI_LOAD(&p->cancel);
 }
 
 /* A task: one tile, all samples of the pass. */
@@ -5820,7 +5820,6 @@ static pt_result pti_run_passes(pti_pass *p, pt_film *film, pt_report *report, p
 {
     const pt_render_desc *d = p->desc;
     uint32_t done = pt_film_spp(film), made = 0, end;
-    double cpu = pt_cpu_seconds();
     pt_result result = PT_OK;
     pt_error error;
     for (;;) {
@@ -5838,10 +5837,11 @@ static pt_result pti_run_passes(pti_pass *p, pt_film *film, pt_report *report, p
         p->target_spp = d->spp;
         result = pti_render_pass(p, film, d->first_sample + done, d->first_sample + end, d->threads);
         now->wall_seconds = pt_wall_seconds() - p->start;
-        now->cpu_seconds = pt_cpu_seconds() - cpu;
+        now->cpu_seconds = pt_cpu_seconds() - p->cpu_start;
         now->rays = p->rays_done;
         if (result != PT_OK) {
-            now->stopped_by = result == PT_ERROR_CANCELLED ? "cancelled" : "memory";
+            now->stopped_by = result != PT_ERROR_CANCELLED ? "memory" : PTI_LOAD(&p->cancel) == 2 ? "time, inside a path" : "cancelled";
+            if (PTI_LOAD(&p->cancel) == 2) result = PT_OK; /* a budget is no failure */
             break;
         }
         made += end - done;
@@ -5910,6 +5910,7 @@ PTDEF pt_result pt_render(const pt_scene *scene, const pt_render_desc *desc, pt_
     if (result != PT_OK) return result;
     memset(&p, 0, sizeof p);
     p.start = p.last_call = pt_wall_seconds();
+    p.cpu_start = pt_cpu_seconds();
     p.planned = d.sampler == PT_SAMPLER_STRATIFIED ? (d.single_net ? d.first_sample + d.spp : (d.first_sample + d.spp + 1) / 2) : 0;
     result = pti_prepare_film(film, &d, pti_fingerprint(scene, &d, method, p.planned));
     if (result != PT_OK) return result;
@@ -5922,7 +5923,8 @@ PTDEF pt_result pt_render(const pt_scene *scene, const pt_render_desc *desc, pt_
     p.li = pti_pick_instance(method, scene, &d, &body);
     p.options = d.li;
     p.relmse = -1;
-    if (!p.options.cancel) p.options.cancel = &p.cancel;
+    p.options.poll = pti_poll;
+    p.options.poll_user = &p;
     p.film = &copy;
     copy.alloc_user = film->alloc_user;
 #if PTI_HAS_THREADS
