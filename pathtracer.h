@@ -619,7 +619,7 @@ PTDEF double pt_irradiance_polygon(double radiance, pt_vec3 p, pt_vec3 n, const 
 typedef struct pt_spectrum {
     const double *nm, *value;
     int count;
-    int zero_outside; /* outside the table: 0 = the end values go on, 1 = nothing                          */
+    int zero_outside; /* 0 = the end values go on outside the table, 1 = nothing from the last entry on    */
 } pt_spectrum;
 
 /* The value at a wavelength in nm. */
@@ -2549,10 +2549,9 @@ PTDEF double pt_irradiance_polygon(double radiance, pt_vec3 p, pt_vec3 n, const 
 PTDEF double pt_spectrum_at(const pt_spectrum *s, double nm)
 {
     int i, last = s->count - 1;
-    if (nm < s->nm[0] || nm > s->nm[last])
+    if (nm < s->nm[0] || nm >= s->nm[last])
         return s->zero_outside ? 0 : nm < s->nm[0] ? s->value[0] : s->value[last];
     for (i = 0; i < last - 1 && nm > s->nm[i + 1];) i++;
-    if (last == 0) return s->value[0];
     return s->value[i] + (s->value[i + 1] - s->value[i]) * (nm - s->nm[i]) / (s->nm[i + 1] - s->nm[i]);
 }
 
@@ -3116,6 +3115,11 @@ static void pti_bounds_add(pti_bounds *b, pt_vec3 lo, pt_vec3 hi)
     }
 }
 
+#if PTI_HAS_BVH
+
+#define PTI_BINS 16
+#define PTI_LEAF_MAX 8
+
 static void pti_bounds_join(pti_bounds *b, const pti_bounds *other)
 {
     int k;
@@ -3124,11 +3128,6 @@ static void pti_bounds_join(pti_bounds *b, const pti_bounds *other)
         if (other->hi[k] > b->hi[k]) b->hi[k] = other->hi[k];
     }
 }
-
-#if PTI_HAS_BVH
-
-#define PTI_BINS 16
-#define PTI_LEAF_MAX 8
 
 static double pti_bounds_half_area(const pti_bounds *b)
 {
@@ -3336,7 +3335,7 @@ PTDEF void pt_bvh_free(pt_bvh *bvh, void *alloc_user)
 /* best->t as a limit for boxes, rounded up. */
 PTI_INLINE pt_real pti_box_limit(double t)
 {
-    return (pt_real)t * PTI_R(1 + 4 * PTI_UNIT_ROUNDOFF);
+    return (pt_real)t * PTI_R(1 + 16 * PTI_UNIT_ROUNDOFF);
 }
 
 /* Walks the tree, near child first; any = 1 stops at the first hit. */
@@ -4795,6 +4794,7 @@ PTDEF double pt_mis_weight(double p1, double p2, pt_heuristic heuristic)
 {
     double r;
     if (!(p1 > 0)) return 0;
+    if (p1 == p2) return 0.5; /* two infinite ones too */
     r = p2 / p1;
     return heuristic == PT_HEURISTIC_POWER ? 1 / (1 + r * r) : 1 / (1 + r);
 }
@@ -5956,7 +5956,8 @@ static void pti_print_number(FILE *file, double value, int width, int known)
     int i;
     if (known) pti_append_real(text, sizeof text, value);
     else pti_append(text, sizeof text, "unknown");
-    for (i = (int)strlen(text); i < width; i++) fputc(' ', file);
+    fputc(' ', file);
+    for (i = (int)strlen(text) + 1; i < width; i++) fputc(' ', file);
     fputs(text, file);
 }
 
@@ -5968,19 +5969,19 @@ PTDEF void pt_report_print(const pt_report *report, FILE *file)
             report->sampler ? report->sampler : "no", report->body ? report->body : "no", report->width, report->height);
     if (report->threads > 0) fprintf(file, "%d threads\n", report->threads);
     else fprintf(file, "the caller's threads\n");
-    fprintf(file, "       spp      CPU s     wall s     Mrays/s   est. RMSE  est. relMSE  efficiency%s\n",
-            truth ? "   true RMSE  true relMSE" : "");
+    fprintf(file, "       spp       CPU s      wall s     Mrays/s   est. RMSE  est. relMSE  efficiency%s\n",
+            truth ? "   true RMSE true relMSE" : "");
     for (i = 0; i < report->row_count; i++) {
         const pt_report_row *r = &report->rows[i];
         fprintf(file, "%10lu", (unsigned long)r->spp);
-        pti_print_number(file, r->cpu_seconds, 11, 1);
-        pti_print_number(file, r->wall_seconds, 11, 1);
+        pti_print_number(file, r->cpu_seconds, 12, 1);
+        pti_print_number(file, r->wall_seconds, 12, 1);
         pti_print_number(file, r->wall_seconds > 0 ? 1e-6 * (double)r->rays / r->wall_seconds : 0, 12, r->wall_seconds > 0);
         pti_print_number(file, r->error.rmse, 12, r->estimated);
-        pti_print_number(file, r->error.relmse, 13, r->estimated);
+        pti_print_number(file, r->error.relmse, 12, r->estimated);
         pti_print_number(file, r->efficiency, 12, r->efficiency > 0);
         if (truth) pti_print_number(file, r->true_error.rmse, 12, 1);
-        if (truth) pti_print_number(file, r->true_error.relmse, 13, 1);
+        if (truth) pti_print_number(file, r->true_error.relmse, 12, 1);
         fputc('\n', file);
     }
     fprintf(file, "stopped by %s at %lu samples per pixel; %lu contributions were not finite\n",
