@@ -1091,9 +1091,9 @@ typedef enum pt_heuristic { PT_HEURISTIC_POWER = 0, PT_HEURISTIC_BALANCE } pt_he
 
 #if PTI_HAS_OBSERVER
 /* Told of each contribution to a path's radiance, for light-path expressions: `word` reads from the light to
-   the eye over L D G S E ("LDDE"), `value` is already weighted. Paths of more than PT_WORD_MAX edges keep
-   their last letters before the eye and begin with '*'. Values of one path sum to its radiance up to
-   rounding; observing changes no random number. */
+   the eye over L D G S E ("LDDE"), `value` is already weighted. With more than PT_WORD_MAX letters between L
+   and E the last ones before the eye are kept and '*' stands for L and the others. Values of one path sum to
+   its radiance up to rounding; observing changes no random number. */
 typedef void (*pt_observer)(void *user, const char *word, int edges, pt_rgbd value);
 #define PT_WORD_MAX 60
 #endif
@@ -1253,8 +1253,8 @@ typedef struct pt_report {
 
 /* All defaults: spp 64, the rest zero. */
 PTDEF pt_render_desc pt_render_defaults(void);
-/* Renders a committed scene. film: an empty one is made; a film of the same fingerprint whose samples end
-   where first_sample begins is continued, and then spp counts all samples; anything else is
+/* Renders a committed scene. film: an empty one is made; a film of the same fingerprint that holds samples
+   from first_sample on without a gap is continued until it has spp in all; anything else is
    PT_ERROR_MISMATCH. report may be NULL. On PT_ERROR_CANCELLED the film holds all finished passes.
    film = function of (scene, camera, method, options, seed, sample range): the same bits for any number of
    threads, tile size and pass length. */
@@ -6041,7 +6041,12 @@ typedef struct pti_axes {
     double x0, x1, y0, y1;  /* log10 of the ends                                                           */
 } pti_axes;
 
-enum { PTI_SVG_W = 640, PTI_SVG_H = 440, PTI_SVG_LEFT = 70, PTI_SVG_RIGHT = 150, PTI_SVG_TOP = 40, PTI_SVG_BOTTOM = 55 };
+#define PTI_SVG_W 640.0
+#define PTI_SVG_H 440.0
+#define PTI_SVG_LEFT 70.0
+#define PTI_SVG_RIGHT 150.0
+#define PTI_SVG_TOP 40.0
+#define PTI_SVG_BOTTOM 55.0
 
 static double pti_svg_x(const pti_axes *a, double log_x)
 {
