@@ -152,15 +152,20 @@
 #define PT_VERSION_PATCH 0
 #define PT_VERSION_STRING "0.1.0"
 
-#if (defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ > 0)) && \
+#if (defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ > 0) || \
+     defined(__ASSOCIATIVE_MATH__) || defined(__RECIPROCAL_MATH__) || defined(_M_FP_FAST)) && \
     !defined(PT_ALLOW_FAST_MATH)
-#error "pathtracer.h: -ffast-math removes the checks for NaN and the guarantees of [PT-06]; see PT_ALLOW_FAST_MATH"
+#error "pathtracer.h: -ffast-math and its kin remove the checks for NaN and the guarantees of [PT-06]; see PT_ALLOW_FAST_MATH"
 #endif
 
 /* The switches, normalised once: below this table only PTI_HAS_X is asked. */
 #ifdef PT_ONLY_PATH
+#ifndef PT_NO_OBSERVER
 #define PT_NO_OBSERVER
+#endif
+#ifndef PT_NO_SCENES
 #define PT_NO_SCENES
+#endif
 #define PTI_HAS_ALL_METHODS 0
 #else
 #define PTI_HAS_ALL_METHODS 1
@@ -170,8 +175,8 @@
 #endif
 #ifdef PT_NO_THREADS
 #define PTI_HAS_THREADS 0
-#elif defined(__unix__) || defined(__APPLE__) || defined(_WIN32)
-#define PTI_HAS_THREADS 1
+#elif (defined(__GNUC__) && (defined(__unix__) || defined(__APPLE__) || defined(_WIN32))) || defined(_MSC_VER)
+#define PTI_HAS_THREADS 1 /* where threads and atomic counters are known */
 #else
 #define PTI_HAS_THREADS 0
 #endif
@@ -277,8 +282,8 @@ PTDEF double pt_wall_seconds(void);
 /* CPU seconds that this process has used so far, over all its threads. */
 PTDEF double pt_cpu_seconds(void);
 
-/* The step of pt_wall_seconds in seconds: 1e-9 usually, 1 where only time() is visible (see the note on
-   -std=c99 above). */
+/* The step of pt_wall_seconds in seconds: below 1e-6 usually, 1 where only time() is visible (see the note
+   on -std=c99 above). */
 PTDEF double pt_wall_resolution(void);
 
 /* How many threads this machine can run at once; 1 without threads or where it cannot be found out. */
@@ -533,10 +538,11 @@ PTDEF pt_result pt_estimate_mean(pt_integrand f, void *user, int dimensions, uin
 
 /* Uniform point of the unit disk by the concentric map [Shi97]; density 1/pi per area. */
 PTDEF pt_vec2 pt_warp_disk(pt_vec2 u);
+PTDEF pt_real pt_warp_disk_pdf_a(void);
 /* Uniform direction of the hemisphere z >= 0; density 1/(2 pi) per solid angle. */
 PTDEF pt_vec3 pt_warp_hemisphere(pt_vec2 u);
 PTDEF pt_real pt_warp_hemisphere_pdf_w(pt_vec3 w);
-/* Cosine-weighted direction of the hemisphere (Malley); density cos/pi. z is never below 2^-24 (float). */
+/* Cosine-weighted direction of the hemisphere (Malley); density cos/pi. z is never below 2^-12 (float). */
 PTDEF pt_vec3 pt_warp_cosine(pt_vec2 u);
 PTDEF pt_real pt_warp_cosine_pdf_w(pt_vec3 w);
 /* Uniform direction of the sphere; density 1/(4 pi). */
@@ -554,7 +560,7 @@ typedef struct pt_spherical_triangle {
     double a[3], b[3], t[3];  /* directions to corners a and b; unit tangent at a of the arc from a to c    */
     double arc;               /* length of that arc                                                        */
     double ab1, triple, bt;   /* 1 + a.b, |a.(b x t)|, b.t                                                 */
-    double solid_angle;       /* sr, in [0, 4 pi)                                                          */
+    double solid_angle;       /* sr, in [0, 2 pi]                                                          */
 } pt_spherical_triangle;
 
 /* Prepares; returns the solid angle in sr, 0 if p lies in the plane of the triangle or the triangle has no
@@ -568,6 +574,7 @@ typedef struct pt_spherical_rectangle {
     double x[3], y[3], z[3];  /* frame: the edges, and the normal towards p                                */
     double x0, x1, y0, y1, z0;
     double b0, b1, k;
+    int as_triangles;         /* 1: sample it as two spherical triangles                                   */
     double solid_angle;       /* sr, in [0, 2 pi)                                                          */
 } pt_spherical_rectangle;
 
@@ -768,12 +775,13 @@ typedef struct pt_bsdf_sample_result {
 
 /* The BSDF of a material at a hit. */
 PTDEF pt_bsdf pt_bsdf_make(const pt_material *m, const pt_hit *hit);
-/* f(wo, wi) in 1/sr, without cosine, summed over the lobes of the mask. Delta lobes give 0. */
+/* f(wo, wi) in 1/sr, without cosine, summed over the lobes of the mask. Delta lobes give 0. The correction of
+   importance transport for shading normals ([Vea97] 5.3) is the caller's. */
 PTDEF pt_rgb pt_bsdf_eval(const pt_bsdf *b, pt_vec3 wo, pt_vec3 wi, pt_transport mode, unsigned lobes);
 /* Density per solid angle with which pt_bsdf_sample, given wo, draws wi; 0 for delta lobes. */
 PTDEF pt_real pt_bsdf_pdf_w(const pt_bsdf *b, pt_vec3 wo, pt_vec3 wi, pt_transport mode);
 /* Draws wi; u_lobe chooses the lobe, u the direction. 0: nothing was sampled (the path ends). */
-PTDEF int pt_bsdf_sample(const pt_bsdf *b, pt_vec3 wo, pt_real u_lobe, pt_vec2 u, pt_transport mode,
+PTDEF int pt_bsdf_sample(const pt_bsdf *b, pt_vec3 wo, double u_lobe, pt_vec2 u, pt_transport mode,
                          pt_bsdf_sample_result *out);
 
 /* Fresnel reflectance of unpolarised light at a smooth dielectric: cos_i in [0,1], eta = index on the far
@@ -806,7 +814,7 @@ typedef struct pt_light_sample_result {
     pt_vec3 p, p_error, n;   /* the point on the light and its normal; n = 0 for a point light             */
     pt_real distance;        /* to p; larger than the scene for the environment                            */
     pt_rgb radiance;         /* what arrives if nothing is in between; point: I / d^2                      */
-    pt_real pdf_w;           /* density per solid angle given this light; 1 for a point light              */
+    double pdf_w;            /* density per solid angle given this light; 1 for a point light              */
     int delta;               /* 1: no other technique can find this light                                  */
 } pt_light_sample_result;
 
@@ -953,18 +961,18 @@ PTDEF int pt_intersect(const pt_scene *scene, const pt_ray *ray, pt_hit *hit);
 PTDEF int pt_occluded(const pt_scene *scene, const pt_ray *ray);
 
 /* Chooses a light by power, u in [0,1). -1 if the scene has none. */
-PTDEF int pt_light_choose(const pt_scene *scene, pt_real u, pt_real *pmf);
+PTDEF int pt_light_choose(const pt_scene *scene, double u, double *pmf);
 /* Samples the light as seen from p; 0 if it cannot light p (behind it, no extent). Area lights by solid
    angle. */
 PTDEF int pt_light_sample(const pt_scene *scene, int light, pt_vec3 p, pt_vec2 u, pt_light_sample_result *out);
 /* The density per solid angle at p with which pt_light_sample finds what a ray from p hit: `hit` on an area
    light, or NULL for the environment. Without the probability of the choice. */
-PTDEF pt_real pt_light_pdf_w(const pt_scene *scene, int light, pt_vec3 p, const pt_hit *hit);
+PTDEF double pt_light_pdf_w(const pt_scene *scene, int light, pt_vec3 p, const pt_hit *hit);
 /* Samples a ray that leaves the light: a point with u_p, a direction with u_w, u_side chooses the side of a
    sphere. */
 PTDEF int pt_light_sample_le(const pt_scene *scene, int light, pt_vec2 u_p, pt_vec2 u_w, pt_real u_side,
                              pt_light_emission_result *out);
-/* Its two densities, for emission from point p with normal n into w. */
+/* Its two densities, for emission into w from any point that has normal n. `light` must exist. */
 PTDEF void pt_light_pdf_le(const pt_scene *scene, int light, pt_vec3 n, pt_vec3 w, double *pdf_a,
                            double *pdf_w);
 /* Radiance that hit's surface emits towards wo. */
@@ -1019,7 +1027,7 @@ typedef struct pt_film {
     double *half[2];         /* width * height * 3 sums                                                    */
     double *splat[2];        /* contributions of light paths, NULL without; same scale                     */
     double *albedo, *normal; /* width * height * 3 sums over all samples, NULL unless asked for            */
-    double *depth;           /* width * height                                                             */
+    double *depth;           /* width * height: sums of distances from the ray's origin, misses add 0      */
     int width, height;
     uint32_t samples[2];     /* per pixel, in each half                                                    */
     pt_range *ranges;        /* which samples are in: disjoint, rising                                     */
@@ -1072,7 +1080,8 @@ typedef struct pt_error {
 } pt_error;
 
 /* The error estimated from the two halves, without a reference: nA nB / (nA + nB)^2 * (A-B)^2 is an unbiased
-   estimate of a pixel's squared error. It cannot see what both halves miss. 0 if unknown (one half empty). */
+   estimate of a pixel's squared error if nA = nB, or if a half's variance falls as 1/n (Sobol points beat that,
+   so odd counts overestimate a little). It cannot see what both halves miss. 0 if unknown (one half empty). */
 PTDEF int pt_film_error_estimate(const pt_film *film, pt_error *out);
 /* The error against a reference picture of the same size (rows from the top, RGB). */
 PTDEF void pt_film_error(const pt_film *film, const float *reference, pt_error *out);
@@ -1105,7 +1114,8 @@ typedef struct pt_li_options {
     pt_real roulette_survival;  /* PT_ROULETTE_CONSTANT: in (0, 1); 0 = 0.8                                */
     int roulette_start;         /* edges before the first roulette, >= 1; 0 = 1 if constant, else 3        */
     pt_heuristic heuristic;     /* of multiple importance sampling                                         */
-    int (*poll)(void *user);    /* asked every 2^16 edges of a path; non-zero ends it (NULL = never)       */
+    int (*poll)(void *user);    /* asked every 2^16 edges of a path, from the thread that renders it;
+                                   non-zero ends it (NULL = never)                                         */
     void *poll_user;
 #if PTI_HAS_OBSERVER
     pt_observer observer;       /* NULL = none. Called from the rendering threads                          */
@@ -1150,14 +1160,15 @@ PTDEF double pt_mis_weight(double p1, double p2, pt_heuristic heuristic);
    ===================================================================================================== */
 
 #if PTI_HAS_FILES
-/* Write the film's picture times `exposure` under `path`: to a temporary name beside it first, then renamed,
-   so that no partial file ever stands there.
+/* Write the film's picture times `exposure` (>= 0) under `path`: to path.part first, then renamed, so that no
+   partial file ever stands there.
    PPM: binary P6, 8 bits, sRGB transfer, clipped. PFM: linear float, rows from the bottom, little-endian.
    PNG: 8 bits, sRGB. */
 PTDEF pt_result pt_write_ppm(const char *path, const pt_film *film, double exposure);
 PTDEF pt_result pt_write_pfm(const char *path, const pt_film *film);
 PTDEF pt_result pt_write_png(const char *path, const pt_film *film, double exposure);
-/* The same from plain arrays: rows from the top, three bytes or three floats a pixel. */
+/* The same from plain arrays: rows from the top, three bytes or three floats a pixel. What PNG needs to work
+   in is allocated with user = NULL. PNG: at most 600 megapixels. */
 PTDEF pt_result pt_write_ppm_bytes(const char *path, const unsigned char *rgb, int width, int height);
 PTDEF pt_result pt_write_png_bytes(const char *path, const unsigned char *rgb, int width, int height);
 PTDEF pt_result pt_write_pfm_floats(const char *path, const float *rgb, int width, int height);
@@ -1177,7 +1188,7 @@ typedef struct pt_method {
 
 /* All methods of this build; pt_method_count of them. The first is the default. */
 PTDEF const pt_method *pt_methods(int *count);
-/* By name, NULL if there is none. */
+/* By name, NULL if there is none; the name NULL means the default. */
 PTDEF const pt_method *pt_method_find(const char *name);
 
 /* State of a running render, for the callback. */
@@ -1200,11 +1211,14 @@ typedef struct pt_render_desc {
     int width, height;          /* pixels; 0 = 256                                                         */
     uint32_t spp;               /* samples per pixel, the most if another budget is set too; 0 = no limit,
                                    if another budget is set, else 64                                       */
-    double seconds;             /* wall seconds; 0 = no limit. Budgets end at whole passes                 */
+    double seconds;             /* wall seconds; 0 = no limit. Budgets end at whole passes; a path of more
+                                   than 2^16 edges that outlasts one takes its pass with it, which favours
+                                   short paths: negligible unless a closed scene loses next to nothing     */
     double cpu_seconds;         /* CPU seconds of the process; 0 = no limit                                */
     double target_error;        /* stop when sqrt(estimated relmse) is below; 0 = no limit. Stopping by an
                                    estimate biases the result by O(1/n)                                    */
-    uint32_t first_sample;      /* index of the first sample: a shard of a larger picture; 0               */
+    uint32_t first_sample;      /* index of the first sample: a shard of a larger picture; 0. Stratified
+                                   shards are nets of their own and do not merge                           */
     const char *method;         /* NULL = "path"                                                           */
     pt_sampler_kind sampler;    /* 0 = Sobol                                                               */
     uint64_t seed;              /* every value, 0 too, is a seed                                           */
@@ -1218,8 +1232,9 @@ typedef struct pt_render_desc {
     double reference_mse_001;   /* that reference's own error, subtracted from relmse_001                  */
     pt_parallel_fn parallel;    /* NULL = own threads                                                      */
     void *parallel_user;
-    int (*progress)(void *user, const pt_progress *progress); /* about ten times a second, from one thread
-                                   at a time; non-zero cancels: the running pass is dropped                */
+    int (*progress)(void *user, const pt_progress *progress); /* about ten times a second (a pixel's samples
+                                   of one pass, or 2^16 edges, apart at least), from one thread at a time;
+                                   non-zero cancels: the running pass is dropped                           */
     void *progress_user;
 } pt_render_desc;
 
@@ -1246,6 +1261,7 @@ typedef struct pt_report {
     uint64_t rays;
     uint64_t nonfinite;         /* contributions that were NaN or infinite, counted as zero                */
     const char *method, *sampler, *stopped_by, *body; /* static strings                                    */
+    const char *error;          /* why pt_render refused, as a sentence; NULL if it did not                */
     unsigned needs;
 } pt_report;
 
@@ -1308,7 +1324,8 @@ PTDEF pt_result pt_scene_glass_ball(pt_scene *scene, pt_camera *camera);
 PTDEF pt_result pt_scene_smallpt(pt_scene *scene, pt_camera *camera);
 
 /* Measured reflectance of the Cornell box walls and emission of its lamp, as tables; and the linear RGB that
-   pt_scene_cornell makes of them. name: "white", "red", "green" or "lamp". */
+   pt_scene_cornell makes of them. name: "white", "red", "green" or "lamp"; any other gives an empty table and
+   black. */
 PTDEF pt_spectrum pt_cornell_spectrum(const char *name);
 PTDEF pt_rgb pt_cornell_rgb(const char *name);
 #endif
@@ -1326,15 +1343,11 @@ PTDEF pt_rgb pt_cornell_rgb(const char *name);
 #if defined(PATHTRACER_IMPLEMENTATION) && !defined(PTI_IMPLEMENTED)
 #define PTI_IMPLEMENTED
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /* =====================================================================================================
    [PT-00] CONFIGURATION: implementation
    =====================================================================================================
    Everything that touches the operating system or the compiler stands here: memory, clocks, threads, and
-   the two macros on which the promises of [PT-06] rest. */
+   the macro on which the promises of [PT-06] rest. */
 
 #if defined(PT_MALLOC) && defined(PT_REALLOC) && defined(PT_FREE)
 #elif !defined(PT_MALLOC) && !defined(PT_REALLOC) && !defined(PT_FREE)
@@ -1362,6 +1375,10 @@ extern "C" {
 #elif PTI_HAS_THREADS
 #include <pthread.h>
 #include <unistd.h>
+#endif
+
+#ifdef __cplusplus
+extern "C" {
 #endif
 
 /* A literal in the working precision; powers of two (C++11 has no hexadecimal ones). */
@@ -1394,13 +1411,28 @@ static void pti_fence(double *x)
 }
 #endif
 
-/* A flag that threads share. */
-#if defined(__GNUC__)
-#define PTI_LOAD(p) __atomic_load_n(p, __ATOMIC_RELAXED)
-#define PTI_STORE(p, v) __atomic_store_n(p, v, __ATOMIC_RELAXED)
+/* Counters and flags that threads share. PTI_TAKE is true for the one thread that finds the flag free. Where
+   no atomic operations are known there is one thread (and a user's own pool must be one thread, too). */
+#if defined(_MSC_VER)
+#include <intrin.h>
+typedef __int64 pti_counter;
+#define PTI_LOAD(p) (*(const volatile __int64 *)(p))
+#define PTI_STORE(p, v) ((void)_InterlockedExchange64(p, v))
+#define PTI_ADD(p, v) _InterlockedExchangeAdd64(p, v)
+#define PTI_TAKE(p) (_InterlockedExchange64(p, 1) == 0)
 #else
-#define PTI_LOAD(p) (*(volatile int *)(p))
-#define PTI_STORE(p, v) (*(volatile int *)(p) = (v))
+typedef long pti_counter; /* 32 bits on 32-bit machines: no call into a library for atomics */
+#if defined(__GNUC__)
+#define PTI_LOAD(p) __atomic_load_n(p, __ATOMIC_ACQUIRE)
+#define PTI_STORE(p, v) __atomic_store_n(p, v, __ATOMIC_RELEASE)
+#define PTI_ADD(p, v) __atomic_fetch_add(p, v, __ATOMIC_ACQ_REL)
+#define PTI_TAKE(p) (__atomic_exchange_n(p, 1, __ATOMIC_ACQUIRE) == 0)
+#else
+#define PTI_LOAD(p) (*(p))
+#define PTI_STORE(p, v) ((void)(*(p) = (v)))
+#define PTI_ADD(p, v) ((*(p) += (v)) - (v))
+#define PTI_TAKE(p) (*(p) == 0 && (*(p) = 1) != 0)
+#endif
 #endif
 
 PTDEF const char *pt_result_string(pt_result result)
@@ -1441,8 +1473,9 @@ static void pti_free(void *p, void *user)
     if (p) PT_FREE(p, user);
 }
 
-/* Makes room for `need` elements; grows by half. 0 = failed, the array is as it was. */
-static int pti_reserve(void **array, uint32_t *capacity, size_t need, size_t size, void *user)
+/* Makes room for `need` elements in the array whose pointer is at `array`; grows by half. 0 = failed, the
+   array is as it was. */
+static int pti_reserve(void *array, uint32_t *capacity, size_t need, size_t size, void *user)
 {
     size_t wanted = (size_t)*capacity + *capacity / 2 + 8;
     void *p;
@@ -1450,9 +1483,10 @@ static int pti_reserve(void **array, uint32_t *capacity, size_t need, size_t siz
     if (need <= *capacity) return 1;
     if (wanted < need) wanted = need;
     if (wanted > 0x7fffffffu || wanted > SIZE_MAX / size) return 0;
-    p = PT_REALLOC(*array, wanted * size, user);
+    memcpy(&p, array, sizeof p); /* a T * is not a void * */
+    p = PT_REALLOC(p, wanted * size, user);
     if (!p) return 0;
-    *array = p;
+    memcpy(array, &p, sizeof p);
     *capacity = (uint32_t)wanted;
     return 1;
 }
@@ -1508,38 +1542,22 @@ PTDEF double pt_cpu_seconds(void)
 
 PTDEF int pt_hardware_threads(void)
 {
-#if !PTI_HAS_THREADS
-    return 1;
-#elif defined(_WIN32)
+#if defined(_WIN32)
     SYSTEM_INFO info;
     GetSystemInfo(&info);
-    return info.dwNumberOfProcessors < 1 ? 1 : (int)info.dwNumberOfProcessors;
+    return !PTI_HAS_THREADS || info.dwNumberOfProcessors < 1 ? 1 : (int)info.dwNumberOfProcessors;
+#elif !PTI_HAS_THREADS || !defined(_SC_NPROCESSORS_ONLN)
+    return 1;
 #else
     long n = sysconf(_SC_NPROCESSORS_ONLN);
     return n < 1 ? 1 : n > 1024 ? 1024 : (int)n;
 #endif
 }
 
-#if PTI_HAS_THREADS
-
-#if defined(_WIN32)
-typedef CRITICAL_SECTION pti_mutex;
-static int pti_mutex_make(pti_mutex *m) { InitializeCriticalSection(m); return 1; }
-static void pti_mutex_free(pti_mutex *m) { DeleteCriticalSection(m); }
-static void pti_lock(pti_mutex *m) { EnterCriticalSection(m); }
-static void pti_unlock(pti_mutex *m) { LeaveCriticalSection(m); }
-#else
-typedef pthread_mutex_t pti_mutex;
-static int pti_mutex_make(pti_mutex *m) { return pthread_mutex_init(m, NULL) == 0; }
-static void pti_mutex_free(pti_mutex *m) { pthread_mutex_destroy(m); }
-static void pti_lock(pti_mutex *m) { pthread_mutex_lock(m); }
-static void pti_unlock(pti_mutex *m) { pthread_mutex_unlock(m); }
-#endif
-
-/* A loop shared by several threads: each takes the next index under the lock. */
+/* A loop shared by several threads. */
 typedef struct pti_loop {
-    pti_mutex lock;
-    int next, count;
+    pti_counter next;
+    int count;
     void (*task)(void *context, int index);
     void *context;
 } pti_loop;
@@ -1547,79 +1565,74 @@ typedef struct pti_loop {
 static void pti_loop_run(pti_loop *loop)
 {
     for (;;) {
-        int i;
-        pti_lock(&loop->lock);
-        i = loop->next < loop->count ? loop->next++ : -1;
-        pti_unlock(&loop->lock);
-        if (i < 0) return;
-        loop->task(loop->context, i);
+        pti_counter i = PTI_ADD(&loop->next, 1);
+        if (i >= loop->count) return;
+        loop->task(loop->context, (int)i);
     }
 }
 
+#define PTI_MAX_THREADS 256
+
+#if PTI_HAS_THREADS
+
 #if defined(_WIN32)
+typedef HANDLE pti_thread;
 static DWORD WINAPI pti_loop_thread(LPVOID loop)
 {
     pti_loop_run((pti_loop *)loop);
     return 0;
 }
+static int pti_thread_start(pti_thread *thread, pti_loop *loop)
+{
+    *thread = CreateThread(NULL, 0, pti_loop_thread, loop, 0, NULL);
+    return *thread != NULL;
+}
+static void pti_thread_join(pti_thread thread)
+{
+    WaitForSingleObject(thread, INFINITE);
+    CloseHandle(thread);
+}
 #else
+typedef pthread_t pti_thread;
 static void *pti_loop_thread(void *loop)
 {
     pti_loop_run((pti_loop *)loop);
     return NULL;
 }
+static int pti_thread_start(pti_thread *thread, pti_loop *loop)
+{
+    return pthread_create(thread, NULL, pti_loop_thread, loop) == 0;
+}
+static void pti_thread_join(pti_thread thread)
+{
+    pthread_join(thread, NULL);
+}
 #endif
 
 #endif /* PTI_HAS_THREADS */
-
-#define PTI_MAX_THREADS 256
 
 /* task(context, i) for all i in 0..count-1 on up to `threads` threads, this one included. A thread that
    cannot be started is done without. */
 static void pti_parallel(int threads, int count, void (*task)(void *, int), void *context)
 {
-    int i;
+    pti_loop loop;
 #if PTI_HAS_THREADS
-    if (threads > count) threads = count;
-    if (threads > PTI_MAX_THREADS) threads = PTI_MAX_THREADS;
-    if (threads > 1) {
-        pti_loop loop;
-        int started = 0;
-#if defined(_WIN32)
-        HANDLE handles[PTI_MAX_THREADS];
-#else
-        pthread_t handles[PTI_MAX_THREADS];
+    pti_thread others[PTI_MAX_THREADS];
+    int started = 0;
 #endif
-        loop.next = 0;
-        loop.count = count;
-        loop.task = task;
-        loop.context = context;
-        if (pti_mutex_make(&loop.lock)) {
-            for (i = 1; i < threads; i++) {
-#if defined(_WIN32)
-                handles[started] = CreateThread(NULL, 0, pti_loop_thread, &loop, 0, NULL);
-                if (handles[started] == NULL) break;
-#else
-                if (pthread_create(&handles[started], NULL, pti_loop_thread, &loop) != 0) break;
-#endif
-                started++;
-            }
-            pti_loop_run(&loop);
-            for (i = 0; i < started; i++) {
-#if defined(_WIN32)
-                WaitForSingleObject(handles[i], INFINITE);
-                CloseHandle(handles[i]);
-#else
-                pthread_join(handles[i], NULL);
-#endif
-            }
-            pti_mutex_free(&loop.lock);
-            return;
-        }
-    }
-#endif
+    loop.next = 0;
+    loop.count = count;
+    loop.task = task;
+    loop.context = context;
     (void)threads;
-    for (i = 0; i < count; i++) task(context, i);
+#if PTI_HAS_THREADS
+    while (started + 1 < threads && started + 1 < count && started < PTI_MAX_THREADS && pti_thread_start(&others[started], &loop))
+        started++;
+#endif
+    pti_loop_run(&loop);
+#if PTI_HAS_THREADS
+    while (started > 0) pti_thread_join(others[--started]);
+#endif
 }
 
 /* =====================================================================================================
@@ -1817,10 +1830,11 @@ PTDEF pt_real pt_real_from_u32(uint32_t x)
 /* A number in [0,1) cut (never rounded up to 1) to the working precision. */
 PTI_INLINE pt_real pti_cut(double u)
 {
+    if (!(u > 0)) return 0; /* NaN too */
 #ifdef PT_DOUBLE
-    return u;
+    return fmin(u, 1 - PTI_2_M53);
 #else
-    return (float)(int32_t)(u * 16777216.0) * (float)PTI_2_M24;
+    return (float)(int32_t)(fmin(u, 1 - PTI_2_M24) * 16777216.0) * (float)PTI_2_M24;
 #endif
 }
 
@@ -1937,12 +1951,14 @@ static double pti_draw_sobol(pt_sampler *s, uint32_t dimension)
         s->set = (dimension >> 2) + 1;
         s->set_index = pt_owen_scramble(s->index, (uint32_t)pti_sampler_hash(s, s->set, 2));
     }
-    return (double)pti_reverse_bits(pti_laine_karras(pti_sobol_reversed(s->set_index, dimension & 3), seed)) *
-           PTI_2_M32;
+    /* 32 scrambled digits, and 21 random ones below, so that rare choices have their probability too */
+    return ((double)pti_reverse_bits(pti_laine_karras(pti_sobol_reversed(s->set_index, dimension & 3), seed)) +
+            (double)(pt_hash64(seeds ^ dimension) >> 43) * (1 / 2097152.0)) * PTI_2_M32;
 }
 
 /* A random permutation of 0..n-1 at i: rounds of odd multiplication and xor-shift are a bijection on the
-   smallest power of two above; walking the cycle until the value is below n makes one of 0..n-1 [Ken13]. */
+   smallest power of two above; walking the cycle until the value is below n makes one of 0..n-1; a turn at
+   the end makes each place equally likely [Ken13]. */
 static uint32_t pti_permute(uint32_t i, uint32_t n, uint64_t seed)
 {
     uint32_t mask = n - 1, shift, round;
@@ -1959,7 +1975,7 @@ static uint32_t pti_permute(uint32_t i, uint32_t n, uint64_t seed)
             i ^= i >> shift;
         }
     } while (i >= n);
-    return i;
+    return (uint32_t)((i + pt_hash64(seed + 4) % n) % n); /* a random turn makes each value equally likely */
 }
 
 /* Stratum `index` of `cells` in a random order; a new order each time all are used up. */
@@ -2084,6 +2100,17 @@ PTDEF double pt_normal_isf(double p)
     return 0.5 * (lo + hi);
 }
 
+/* ln Gamma(x) for x > 0 by Stirling's series [DLMF 5.11.1], exact to 1e-16 from x = 10 on; below, by the
+   recurrence. The C library's lgamma writes a global. */
+static double pti_log_gamma(double x)
+{
+    double shift = 0, r;
+    for (; x < 10; x++) shift += log(x);
+    r = 1 / (x * x);
+    r = (1 / 12.0 - r * (1 / 360.0 - r * (1 / 1260.0 - r * (1 / 1680.0 - r * (1 / 1188.0 - r * 691 / 360360.0))))) / x;
+    return (x - 0.5) * log(x) - x + 0.91893853320467274178 + r - shift;
+}
+
 /* One step of Lentz' evaluation of a continued fraction b0 + a1/(b1 + a2/(b2 + ...)). */
 static double pti_lentz(double *f, double *c, double *d, double a, double b)
 {
@@ -2103,7 +2130,7 @@ static double pti_lentz(double *f, double *c, double *d, double a, double b)
 static double pti_beta_fraction(double x, double a, double b)
 {
     double f = 1, c = 1, d = 0;
-    double front = exp(lgamma(a + b) - lgamma(a) - lgamma(b) + a * log(x) + b * log1p(-x)) / a;
+    double front = exp(pti_log_gamma(a + b) - pti_log_gamma(a) - pti_log_gamma(b) + a * log(x) + b * log1p(-x)) / a;
     int i;
     for (i = 1; i < 10000; i++) {
         double m = i / 2, step;
@@ -2132,7 +2159,8 @@ PTDEF double pt_chi2_sf(double x, double df)
     double a = df / 2, y = x / 2, front, sum = 0, term, f, c, d;
     int i;
     if (!(x > 0)) return 1;
-    front = exp(a * log(y) - y - lgamma(a));
+    if (x > 1e300) return 0;
+    front = exp(a * log(y) - y - pti_log_gamma(a));
     if (y < a + 1) {
         term = 1 / a;
         for (i = 1; i < 100000 && term > 1e-17 * sum; i++) {
@@ -2210,6 +2238,11 @@ PTDEF pt_vec2 pt_warp_disk(pt_vec2 u)
     return pti_concentric(2 * u.x - 1, 2 * u.y - 1, &r);
 }
 
+PTDEF pt_real pt_warp_disk_pdf_a(void)
+{
+    return PTI_R(1 / PT_PI);
+}
+
 PTDEF pt_vec3 pt_warp_hemisphere(pt_vec2 u)
 {
     pt_real r = pti_sqrt((1 - u.x) * (1 + u.x)), phi = PTI_R(2 * PT_PI) * u.y;
@@ -2275,13 +2308,21 @@ PTDEF pt_vec2 pt_warp_triangle(pt_vec2 u)
    This gives the solid angle of the whole (s = arc), and solved for h it is the sampling of [Arv95]: the part
    of the triangle up to c(s) has solid angle u E where
        tan(h) = (1 + a.b) sin(u E/2) / (V cos(u E/2) - (b.t) sin(u E/2)).
-   No term is a difference of nearly equal numbers if V and b.t are formed from b - a; so the relative error
-   stays small for triangles of any size, where Arvo's sum of angles minus pi loses everything. */
+   V and b.t are formed from the chord b - a, and that from the corners before they are normalised; so the
+   relative error stays small for tiny triangles, where Arvo's sum of angles minus pi loses everything. */
+
+/* w/|w| - v/|v| without cancellation: (e - a (|w| - |v|)) / |w| with e = w - v, a = v/|v| and
+   |w| - |v| = e.(v + w) / (|v| + |w|). */
+static pti_d3 pti_chord(pti_d3 v, pti_d3 w, pti_d3 a)
+{
+    pti_d3 e = pti_d_sub(w, v);
+    double lv = pti_d_length(v), lw = pti_d_length(w);
+    return pti_d_scale(pti_d_sub(e, pti_d_scale(a, pti_d_dot(e, pti_d_add(v, w)) / (lv + lw))), 1 / lw);
+}
 
 static double pti_spherical_triangle_setup(pt_spherical_triangle *s, pti_d3 v0, pti_d3 v1, pti_d3 v2)
 {
-    pti_d3 a = pti_d_normalize(v0), b = pti_d_normalize(v1), c = pti_d_normalize(v2);
-    pti_d3 ab = pti_d_sub(b, a), ac = pti_d_sub(c, a), t;
+    pti_d3 a = pti_d_normalize(v0), b = pti_d_normalize(v1), ab = pti_chord(v0, v1, a), ac = pti_chord(v0, v2, a), t;
     double e, h;
     t = pti_d_sub(ac, pti_d_scale(a, pti_d_dot(a, ac)));
     t = pti_d_normalize(t);
@@ -2326,16 +2367,21 @@ PTDEF pt_vec3 pt_spherical_triangle_sample(const pt_spherical_triangle *s, pt_ve
 
    In the frame of the rectangle (x, y along the edges, z towards p, so that the plane is z = z0 < 0) the part
    up to abscissa x has a solid angle that can be inverted in closed form; along the remaining line the
-   ordinate follows from the sine of its elevation. The angles enter as a sum minus 2 pi, with an error of a
-   few 2^-53 * 2 pi: relative to a solid angle below 3e-8 sr that is more than float's 2^-24. Below, the
-   rectangle is sampled as two spherical triangles, which have no such loss. */
+   ordinate follows from the sine of its elevation. The angles enter as a sum minus 2 pi: an error of 2^-53
+   (2 pi + what acos makes of an argument near 1 or -1), which for a small or nearly edge-on rectangle is more
+   than 2^-24 of its solid angle. Such a rectangle is sampled as two spherical triangles, which have no such
+   loss. */
 
-#define PTI_RECTANGLE_TINY 3e-8
-
-PTDEF double pt_spherical_rectangle_make(pt_spherical_rectangle *s, pt_vec3 p, pt_vec3 corner, pt_vec3 e1,
-                                         pt_vec3 e2)
+/* Rounding error of acos(x), in units of 2^-53: its slope. */
+static double pti_acos_slope(double x)
 {
-    pti_d3 d = pti_d_between(p, corner), d1 = pti_d_from(e1), d2 = pti_d_from(e2), far = pti_d_add(pti_d_add(d, d1), d2);
+    return 1 / sqrt(fmax(PTI_2_M53, (1 - x) * (1 + x)));
+}
+
+/* d: the corner relative to p. */
+static double pti_spherical_rectangle_setup(pt_spherical_rectangle *s, pti_d3 d, pti_d3 d1, pti_d3 d2)
+{
+    pti_d3 opposite = pti_d_add(pti_d_add(d, d1), d2);
     pti_d3 x = pti_d_normalize(d1), y = pti_d_normalize(d2), z = pti_d_cross(x, y);
     pt_spherical_triangle half;
     double n0, n2, n3;
@@ -2358,13 +2404,20 @@ PTDEF double pt_spherical_rectangle_make(pt_spherical_rectangle *s, pt_vec3 p, p
     s->b0 = n0;
     s->b1 = n2;
     s->k = 2 * PT_PI - acos(fmax(-1, fmin(1, -n2 * n3))) - acos(fmax(-1, fmin(1, -n3 * n0)));
-    s->solid_angle = pti_spherical_triangle_setup(&half, d, pti_d_add(d, d1), far);
-    s->solid_angle += pti_spherical_triangle_setup(&half, d, far, pti_d_add(d, d2));
+    s->solid_angle = pti_spherical_triangle_setup(&half, d, pti_d_add(d, d1), opposite);
+    s->solid_angle += pti_spherical_triangle_setup(&half, d, opposite, pti_d_add(d, d2));
     if (!(s->z0 < 0)) s->solid_angle = 0;
+    s->as_triangles = PTI_2_M53 * (2 * PT_PI + pti_acos_slope(n2 * n3) + pti_acos_slope(n3 * n0)) > PTI_2_M24 * s->solid_angle;
     return s->solid_angle;
 }
 
-static pti_d3 pti_spherical_rectangle_tiny(const pt_spherical_rectangle *s, double u0, double u1)
+PTDEF double pt_spherical_rectangle_make(pt_spherical_rectangle *s, pt_vec3 p, pt_vec3 corner, pt_vec3 e1,
+                                         pt_vec3 e2)
+{
+    return pti_spherical_rectangle_setup(s, pti_d_between(p, corner), pti_d_from(e1), pti_d_from(e2));
+}
+
+static pti_d3 pti_spherical_rectangle_halves(const pt_spherical_rectangle *s, double u0, double u1)
 {
     pti_d3 v00 = pti_d(s->x0, s->y0, s->z0), v10 = pti_d(s->x1, s->y0, s->z0);
     pti_d3 v11 = pti_d(s->x1, s->y1, s->z0), v01 = pti_d(s->x0, s->y1, s->z0);
@@ -2395,7 +2448,7 @@ static pti_d3 pti_spherical_rectangle_direction(const pt_spherical_rectangle *s,
 {
     pti_d3 x = pti_d(s->x[0], s->x[1], s->x[2]), y = pti_d(s->y[0], s->y[1], s->y[2]);
     pti_d3 z = pti_d(s->z[0], s->z[1], s->z[2]), l;
-    if (s->solid_angle < PTI_RECTANGLE_TINY) l = pti_spherical_rectangle_tiny(s, u0, u1);
+    if (s->as_triangles) l = pti_spherical_rectangle_halves(s, u0, u1);
     else l = pti_spherical_rectangle_local(s, u0, u1);
     l = pti_d_add(pti_d_add(pti_d_scale(x, l.x), pti_d_scale(y, l.y)), pti_d_scale(z, l.z));
     return pti_d_normalize(l);
@@ -2412,25 +2465,25 @@ PTDEF pt_vec3 pt_spherical_rectangle_sample(const pt_spherical_rectangle *s, pt_
    up. `stack` holds the indices that are still too small from the left, those too large from the right. */
 static void pti_alias_fill(pt_alias *table, double *scaled, uint32_t *stack)
 {
-    uint32_t n = table->count, i, small = 0, large = n;
+    uint32_t n = table->count, i, low = 0, high = n;
     for (i = 0; i < n; i++) {
         scaled[i] = table->entries[i].pmf * n;
-        if (scaled[i] < 1) stack[small++] = i;
-        else stack[--large] = i;
+        if (scaled[i] < 1) stack[low++] = i;
+        else stack[--high] = i;
     }
-    while (small > 0 && large < n) {
-        uint32_t s = stack[--small], l = stack[large];
+    while (low > 0 && high < n) {
+        uint32_t s = stack[--low], l = stack[high];
         table->entries[s].threshold = scaled[s];
         table->entries[s].alias = l;
         scaled[l] -= 1 - scaled[s];
         if (scaled[l] < 1) {
-            large++;
-            stack[small++] = l;
+            high++;
+            stack[low++] = l;
         }
     }
     /* What is left is full up to rounding. */
-    while (large < n) table->entries[stack[large++]].threshold = 1;
-    while (small > 0) table->entries[stack[--small]].threshold = 1;
+    while (high < n) table->entries[stack[high++]].threshold = 1;
+    while (low > 0) table->entries[stack[--low]].threshold = 1;
 }
 
 PTDEF pt_result pt_alias_make(pt_alias *table, const double *weights, uint32_t count, void *alloc_user)
@@ -2466,8 +2519,9 @@ PTDEF pt_result pt_alias_make(pt_alias *table, const double *weights, uint32_t c
 
 PTDEF uint32_t pt_alias_sample(const pt_alias *table, double u, double *pmf)
 {
-    double scaled = u * table->count;
-    uint32_t i = (uint32_t)scaled;
+    double scaled = u > 0 ? u * table->count : 0;
+    uint32_t i = (uint32_t)fmin(scaled, 4294967295.0);
+    PT_ASSERT(table->count > 0);
     if (i >= table->count) i = table->count - 1; /* u * n may round up to n */
     if (scaled - i >= table->entries[i].threshold) i = table->entries[i].alias;
     *pmf = table->entries[i].pmf;
@@ -2516,7 +2570,8 @@ PTDEF double pt_irradiance_disk(double radiance, double r, double h)
     return PT_PI * radiance * r * r / (r * r + h * h);
 }
 
-/* The part of a polygon with n . v > 0 (v relative to the receiver); out has room for count + 1 corners. */
+/* The part of a polygon with n . v > 0 (v relative to the receiver); out has room for 2 * count corners (a
+   polygon that is not convex may be cut many times). */
 static int pti_clip_horizon(const pti_d3 *v, int count, pti_d3 n, pti_d3 *out)
 {
     int i, kept = 0;
@@ -2532,7 +2587,7 @@ static int pti_clip_horizon(const pti_d3 *v, int count, pti_d3 n, pti_d3 *out)
 PTDEF double pt_irradiance_polygon(double radiance, pt_vec3 p, pt_vec3 n, const pt_vec3 *v, int count)
 {
     /* [Lam60]: E = L/2 sum over edges of (angle of the edge) * (unit normal of its plane through p) . n */
-    pti_d3 in[32], out[66], nd = pti_d_from(n);
+    pti_d3 in[32], out[64], nd = pti_d_from(n);
     double sum = 0;
     int i, kept;
     if (count < 3 || count > 32) return 0;
@@ -2549,6 +2604,7 @@ PTDEF double pt_irradiance_polygon(double radiance, pt_vec3 p, pt_vec3 n, const 
 PTDEF double pt_spectrum_at(const pt_spectrum *s, double nm)
 {
     int i, last = s->count - 1;
+    if (last < 0) return 0;
     if (nm < s->nm[0] || nm >= s->nm[last])
         return s->zero_outside ? 0 : nm < s->nm[0] ? s->value[0] : s->value[last];
     for (i = 0; i < last - 1 && nm > s->nm[i + 1];) i++;
@@ -2826,7 +2882,7 @@ PTI_INLINE int pti_sphere(const pti_ray *r, pt_vec3 centre, double radius, doubl
 {
     pti_d3 d = pti_d(r->d[0], r->d[1], r->d[2]);
     pti_d3 f = pti_d_sub(pti_d(r->o[0], r->o[1], r->o[2]), pti_d_from(centre));
-    double a = pti_d_dot(d, d), b = -pti_d_dot(f, d), l, root, q, c, near, far;
+    double a = pti_d_dot(d, d), b = -pti_d_dot(f, d), l, root, q, c, t0, t1;
     l = pti_d_length(pti_d_add(f, pti_d_scale(d, b / a)));
     if (!(l <= radius)) return 0;
     root = sqrt(a * (radius - l) * (radius + l));
@@ -2834,16 +2890,16 @@ PTI_INLINE int pti_sphere(const pti_ray *r, pt_vec3 centre, double radius, doubl
     c = pti_d_length(f);
     c = (c - radius) * (c + radius);
     if (q == 0) return 0; /* both roots are 0: a tangent at the origin */
-    near = c / q;
-    far = q / a;
-    if (near > far) {
-        double swap = near;
-        near = far;
-        far = swap;
+    t0 = c / q;
+    t1 = q / a;
+    if (t0 > t1) {
+        double swap = t0;
+        t0 = t1;
+        t1 = swap;
     }
-    if (!(near > 0)) near = far;
-    if (!(near > 0 && near < tmax)) return 0;
-    *t = near;
+    if (!(t0 > 0)) t0 = t1;
+    if (!(t0 > 0 && t0 < tmax)) return 0;
+    *t = t0;
     return 1;
 }
 
@@ -2856,8 +2912,8 @@ PTDEF int pt_intersect_sphere(const pt_ray *ray, pt_vec3 centre, pt_real radius,
 /* Is the normal (v1-v0)x(v2-v0) different from zero in double? */
 static int pti_triangle_has_area(pt_vec3 v0, pt_vec3 v1, pt_vec3 v2)
 {
-    pti_d3 n = pti_d_cross(pti_d_between(v0, v1), pti_d_between(v0, v2));
-    return pti_d_length(pti_d_normalize(n)) > 0.5;
+    pti_d3 a = pti_d_between(v0, v1), b = pti_d_between(v0, v2);
+    return pti_edge(a.y, b.z, a.z, b.y) != 0 || pti_edge(a.z, b.x, a.x, b.z) != 0 || pti_edge(a.x, b.y, a.y, b.x) != 0;
 }
 
 PTDEF int pt_intersect_triangle(const pt_ray *ray, pt_vec3 v0, pt_vec3 v1, pt_vec3 v2, double *t, double b[2])
@@ -2872,22 +2928,22 @@ PTDEF int pt_intersect_triangle(const pt_ray *ray, pt_vec3 v0, pt_vec3 v1, pt_ve
    both distances. *entry: where the box begins. */
 PTI_INLINE int pti_box(const pti_ray *r, pt_vec3 lo, pt_vec3 hi, pt_real tmax, pt_real *entry)
 {
-    const pt_real pad = PTI_R(1 + 2 * 3 * PTI_UNIT_ROUNDOFF / (1 - 3 * PTI_UNIT_ROUNDOFF) + PTI_UNIT_ROUNDOFF);
-    pt_real near = 0, far = tmax, n, f;
+    const pt_real pad = PTI_R(1 + 7 * PTI_UNIT_ROUNDOFF); /* 1 + 2 gamma(3), rounded up */
+    pt_real t0 = 0, t1 = tmax, n, f;
     n = ((r->inverse[0] < 0 ? hi.x : lo.x) - r->origin[0]) * r->inverse[0];
     f = ((r->inverse[0] < 0 ? lo.x : hi.x) - r->origin[0]) * r->inverse[0] * pad;
-    if (n > near) near = n;
-    if (f < far) far = f;
+    if (n > t0) t0 = n;
+    if (f < t1) t1 = f;
     n = ((r->inverse[1] < 0 ? hi.y : lo.y) - r->origin[1]) * r->inverse[1];
     f = ((r->inverse[1] < 0 ? lo.y : hi.y) - r->origin[1]) * r->inverse[1] * pad;
-    if (n > near) near = n;
-    if (f < far) far = f;
+    if (n > t0) t0 = n;
+    if (f < t1) t1 = f;
     n = ((r->inverse[2] < 0 ? hi.z : lo.z) - r->origin[2]) * r->inverse[2];
     f = ((r->inverse[2] < 0 ? lo.z : hi.z) - r->origin[2]) * r->inverse[2] * pad;
-    if (n > near) near = n;
-    if (f < far) far = f;
-    *entry = near;
-    return near <= far;
+    if (n > t0) t0 = n;
+    if (f < t1) t1 = f;
+    *entry = t0;
+    return t0 <= t1;
 }
 
 PTDEF int pt_intersect_box(const pt_ray *ray, pt_vec3 lo, pt_vec3 hi)
@@ -3538,14 +3594,14 @@ static int pti_sample_reflection(const pt_bsdf *b, pt_vec3 wo, pti_d3 n, double 
     return pti_side(b, wo) * pt_v3_dot(out->wi, b->ng) > 0;
 }
 
-static int pti_sample_dielectric(const pt_bsdf *b, pt_vec3 wo, pt_real u_lobe, pt_transport mode,
+static int pti_sample_dielectric(const pt_bsdf *b, pt_vec3 wo, double u_lobe, pt_transport mode,
                                  pt_bsdf_sample_result *out)
 {
     double ior = b->material->ior > 0 ? (double)b->material->ior : 1.5, cos_o, cos_t, f, eta;
     pti_d3 n = pti_specular_normal(b, wo, &cos_o), w;
     eta = pti_side(b, wo) > 0 ? ior : 1 / ior;
     f = pt_fresnel_dielectric(cos_o, eta, &cos_t);
-    if ((double)u_lobe < f) {
+    if (u_lobe < f) {
         out->pdf_w = out->pdf_rev_w = (pt_real)f;
         return pti_sample_reflection(b, wo, n, cos_o, out);
     }
@@ -3558,7 +3614,7 @@ static int pti_sample_dielectric(const pt_bsdf *b, pt_vec3 wo, pt_real u_lobe, p
     return pti_side(b, wo) * pt_v3_dot(out->wi, b->ng) < 0;
 }
 
-PTDEF int pt_bsdf_sample(const pt_bsdf *b, pt_vec3 wo, pt_real u_lobe, pt_vec2 u, pt_transport mode,
+PTDEF int pt_bsdf_sample(const pt_bsdf *b, pt_vec3 wo, double u_lobe, pt_vec2 u, pt_transport mode,
                          pt_bsdf_sample_result *out)
 {
     pti_d3 n;
@@ -3583,11 +3639,13 @@ PTDEF int pt_bsdf_sample(const pt_bsdf *b, pt_vec3 wo, pt_real u_lobe, pt_vec2 u
    rectangles and triangles by their spherical images. The density is one over that solid angle for each, and
    pt_light_pdf_w computes it from the same functions that the samplers use. */
 
-/* Perpendicular up to the rounding of the edges themselves. */
-static int pti_is_rectangle(const pt_parallelogram *s)
+/* Are these corners a rectangle? Exactly a parallelogram, and perpendicular up to the rounding of unit edges:
+   4 u of the angle changes the solid angle by no more than that. */
+static int pti_is_rectangle(const pt_vec3 v[4])
 {
-    pti_d3 a = pti_d_from(s->edge1), b = pti_d_from(s->edge2);
-    return fabs(pti_d_dot(a, b)) <= 4 * PTI_UNIT_ROUNDOFF * pti_d_length(a) * pti_d_length(b);
+    pti_d3 a = pti_d_between(v[0], v[1]), b = pti_d_between(v[0], v[3]), c = pti_d_between(v[3], v[2]);
+    return a.x == c.x && a.y == c.y && a.z == c.z &&
+           fabs(pti_d_dot(a, b)) <= 4 * PTI_UNIT_ROUNDOFF * pti_d_length(a) * pti_d_length(b);
 }
 
 /* How a flat light is seen from a point. */
@@ -3617,10 +3675,9 @@ static int pti_flat_make(pti_flat *f, const pt_scene *scene, const pt_primitive 
     f->corner = pti_d_between(p, v[0]);
     f->n = pti_d_cross(pti_d_between(v[0], v[1]), pti_d_between(v[0], v[2]));
     if (!(pti_d_dot(f->corner, f->n) < 0)) return 0;
-    f->is_rectangle = primitive->shape == PT_SHAPE_PARALLELOGRAM && pti_is_rectangle(&scene->parallelograms[primitive->index]);
+    f->is_rectangle = primitive->shape == PT_SHAPE_PARALLELOGRAM && pti_is_rectangle(v);
     if (f->is_rectangle) {
-        const pt_parallelogram *s = &scene->parallelograms[primitive->index];
-        f->solid_angle = pt_spherical_rectangle_make(&f->rectangle, p, s->corner, s->edge1, s->edge2);
+        f->solid_angle = pti_spherical_rectangle_setup(&f->rectangle, f->corner, pti_d_between(v[0], v[1]), pti_d_between(v[0], v[3]));
     } else {
         f->solid_angle = pt_spherical_triangle_make(&f->half[0], p, v[0], v[1], v[2]);
         f->half[1].solid_angle = 0;
@@ -3658,7 +3715,7 @@ static int pti_sample_flat(const pt_scene *scene, const pt_primitive *primitive,
     out->n = pti_d_to(pti_d_normalize(f.n));
     out->wi = pti_d_to(w);
     out->distance = (pt_real)t;
-    out->pdf_w = (pt_real)(1 / f.solid_angle);
+    out->pdf_w = 1 / f.solid_angle;
     return 1;
 }
 
@@ -3683,12 +3740,12 @@ static int pti_sample_sphere_light(const pt_sphere *s, pt_vec3 p, pt_vec2 u, pt_
         l = pt_frame_to_world(&frame, pt_v3((pt_real)cos(phi), (pt_real)sin(phi), 0));
         w = pti_d_add(pti_d_scale(axis, (1 - x) / d), pti_d_scale(pti_d_from(l), sqrt(sin2)));
         t = d * (1 - x) - sqrt(fmax(0, r * r - d * d * sin2)); /* the near side */
-        out->pdf_w = (pt_real)pt_warp_cone_pdf_w(omc);
+        out->pdf_w = pt_warp_cone_pdf_w(omc);
     } else {
         w = pti_d_from(pt_warp_sphere(u));
         x = pti_d_dot(w, axis);
         t = x + sqrt(fmax(0, (r - d) * (r + d) + x * x)); /* the far side */
-        out->pdf_w = pt_warp_sphere_pdf_w();
+        out->pdf_w = (double)pt_warp_sphere_pdf_w();
     }
     n = pti_d_normalize(pti_d_sub(pti_d_scale(w, t), axis));
     m = fabs(c.x) + fabs(c.y) + fabs(c.z) + r + d;
@@ -3700,6 +3757,7 @@ static int pti_sample_sphere_light(const pt_sphere *s, pt_vec3 p, pt_vec2 u, pt_
     return t > 0;
 }
 
+#if PTI_HAS_ENVIRONMENT
 static void pti_sample_environment(const pt_scene *scene, pt_vec3 p, pt_vec2 u, pt_light_sample_result *out)
 {
     pt_vec3 size = pt_v3_sub(scene->hi, scene->lo);
@@ -3707,8 +3765,9 @@ static void pti_sample_environment(const pt_scene *scene, pt_vec3 p, pt_vec2 u, 
     out->distance = 2 * pt_v3_length(size) + pt_v3_length(pt_v3_sub(p, scene->lo));
     out->p = pt_v3_add(p, pt_v3_scale(out->wi, out->distance));
     out->p_error = out->n = pt_v3(0, 0, 0);
-    out->pdf_w = pt_warp_sphere_pdf_w();
+    out->pdf_w = (double)pt_warp_sphere_pdf_w();
 }
+#endif
 
 static int pti_sample_point_light(const pt_light *light, pt_vec3 p, pt_light_sample_result *out)
 {
@@ -3735,40 +3794,37 @@ PTDEF int pt_light_sample(const pt_scene *scene, int light, pt_vec3 p, pt_vec2 u
     out->delta = 0;
     out->radiance = l->emission;
     if (l->kind == PT_LIGHT_POINT) return pti_sample_point_light(l, p, out);
+#if PTI_HAS_ENVIRONMENT
     if (l->kind == PT_LIGHT_ENVIRONMENT) {
         pti_sample_environment(scene, p, u, out);
         return 1;
     }
+#endif
     primitive = &scene->primitives[l->primitive];
     if (primitive->shape == PT_SHAPE_SPHERE) return pti_sample_sphere_light(&scene->spheres[primitive->index], p, u, out);
     return pti_sample_flat(scene, primitive, p, u, out);
 }
 
-PTDEF pt_real pt_light_pdf_w(const pt_scene *scene, int light, pt_vec3 p, const pt_hit *hit)
+PTDEF double pt_light_pdf_w(const pt_scene *scene, int light, pt_vec3 p, const pt_hit *hit)
 {
     const pt_primitive *primitive;
     pti_flat f;
     if (light < 0 || (uint32_t)light >= scene->light_count || scene->lights[light].kind == PT_LIGHT_POINT) return 0;
-    if (scene->lights[light].kind == PT_LIGHT_ENVIRONMENT) return hit ? 0 : pt_warp_sphere_pdf_w();
+    if (scene->lights[light].kind == PT_LIGHT_ENVIRONMENT) return hit ? 0 : (double)pt_warp_sphere_pdf_w();
     if (!hit || hit->primitive != scene->lights[light].primitive) return 0;
     primitive = &scene->primitives[hit->primitive];
     if (primitive->shape == PT_SHAPE_SPHERE) {
         const pt_sphere *s = &scene->spheres[primitive->index];
         double r = (double)s->radius, d = pti_d_length(pti_d_between(p, s->centre));
-        return d > r ? (pt_real)pt_warp_cone_pdf_w(pti_sphere_omc(r, d)) : pt_warp_sphere_pdf_w();
+        return d > r ? pt_warp_cone_pdf_w(pti_sphere_omc(r, d)) : (double)pt_warp_sphere_pdf_w();
     }
-    return pti_flat_make(&f, scene, primitive, p) ? (pt_real)(1 / f.solid_angle) : 0;
+    return pti_flat_make(&f, scene, primitive, p) ? 1 / f.solid_angle : 0;
 }
 
-PTDEF int pt_light_choose(const pt_scene *scene, pt_real u, pt_real *pmf)
+PTDEF int pt_light_choose(const pt_scene *scene, double u, double *pmf)
 {
-    double p;
-    uint32_t i;
     *pmf = 0;
-    if (scene->light_table.count == 0) return -1;
-    i = pt_alias_sample(&scene->light_table, (double)u, &p);
-    *pmf = (pt_real)p;
-    return (int)i;
+    return scene->light_table.count == 0 ? -1 : (int)pt_alias_sample(&scene->light_table, u, pmf);
 }
 
 /* Radius of the sphere around the scene's box; 1 for an empty scene. */
@@ -3815,6 +3871,7 @@ static void pti_le_area(const pt_scene *scene, const pt_light *l, pt_vec2 u_p, p
     out->cos_n = fabs((double)local.z);
 }
 
+#if PTI_HAS_ENVIRONMENT
 static void pti_le_environment(const pt_scene *scene, pt_vec2 u_p, pt_vec2 u_w, pt_light_emission_result *out)
 {
     pti_d3 centre = pti_d_scale(pti_d_add(pti_d_from(scene->lo), pti_d_from(scene->hi)), 0.5);
@@ -3827,6 +3884,7 @@ static void pti_le_environment(const pt_scene *scene, pt_vec2 u_p, pt_vec2 u_w, 
     out->p_error = out->n = pt_v3(0, 0, 0);
     out->cos_n = 1;
 }
+#endif
 
 PTDEF int pt_light_sample_le(const pt_scene *scene, int light, pt_vec2 u_p, pt_vec2 u_w, pt_real u_side,
                              pt_light_emission_result *out)
@@ -3837,8 +3895,10 @@ PTDEF int pt_light_sample_le(const pt_scene *scene, int light, pt_vec2 u_p, pt_v
     out->radiance = l->emission;
     if (l->kind == PT_LIGHT_AREA) {
         pti_le_area(scene, l, u_p, u_w, u_side, out);
+#if PTI_HAS_ENVIRONMENT
     } else if (l->kind == PT_LIGHT_ENVIRONMENT) {
         pti_le_environment(scene, u_p, u_w, out);
+#endif
     } else {
         out->p = l->position;
         out->p_error = out->n = pt_v3(0, 0, 0);
@@ -3895,7 +3955,7 @@ static void pti_append_integer(char *buffer, size_t size, uint64_t value)
     pti_append(buffer, size, digits + i);
 }
 
-/* Up to six significant digits, as %g would print in the C locale. */
+/* Up to six significant digits, as %g would print in the C locale; whole numbers as they are. */
 static void pti_append_real(char *buffer, size_t size, double x)
 {
     char text[40] = "";
@@ -3907,6 +3967,10 @@ static void pti_append_real(char *buffer, size_t size, double x)
     }
     if (x < 0) pti_append(buffer, size, "-");
     x = fabs(x);
+    if (x < 1e15 && x == floor(x)) { /* whole numbers keep all their digits */
+        pti_append_integer(buffer, size, (uint64_t)x);
+        return;
+    }
     e = x > 0 ? (int)floor(log10(x)) : 0;
     m = (uint64_t)(x / pow(10, e) * 1e5 + 0.5); /* d.ddddd as an integer */
     if (m >= 1000000) {
@@ -3976,7 +4040,7 @@ static int pti_scene_no_memory(pt_scene *scene, const char *item, uint32_t numbe
 
 /* Appends one element to an array of the scene; its index, or -1. */
 #define PTI_PUSH(scene, item, array, number, capacity, value) \
-    (pti_reserve((void **)&(scene)->array, &(scene)->capacity, (size_t)(scene)->number + 1, sizeof *(scene)->array, \
+    (pti_reserve(&(scene)->array, &(scene)->capacity, (size_t)(scene)->number + 1, sizeof *(scene)->array, \
                  (scene)->alloc_user) \
          ? ((scene)->array[(scene)->number] = (value), (scene)->committed = 0, (int)(scene)->number++) \
          : pti_scene_no_memory(scene, item, (scene)->number))
@@ -4042,36 +4106,51 @@ PTDEF int pt_add_material(pt_scene *scene, pt_material material)
     return PTI_PUSH(scene, "material", materials, material_count, material_capacity, material);
 }
 
-PTDEF int pt_add_mesh(pt_scene *scene, const pt_vec3 *positions, const pt_vec3 *normals, const pt_vec2 *uvs,
-                      uint32_t vertex_count, const uint32_t *indices, uint32_t triangle_count, int material)
+/* Is the data of a mesh in order? */
+static int pti_check_mesh(pt_scene *scene, const char *item, uint32_t n, const pt_vec3 *positions, const pt_vec3 *normals,
+                          const pt_vec2 *uvs, uint32_t vertex_count, const uint32_t *indices, uint32_t triangle_count)
 {
-    uint32_t n = scene->mesh_count, base = scene->position_count, i;
-    void *user = scene->alloc_user;
-    pt_mesh mesh;
+    uint32_t i;
+    if (vertex_count > 0x7fffffffu - scene->position_count || triangle_count > 0x2aaaaaaau - scene->triangle_count)
+        return !pti_scene_fail(scene, PT_ERROR_ARGUMENT, item, n, "too many vertices or triangles");
     if ((!positions && vertex_count) || (!indices && triangle_count))
-        return pti_scene_fail(scene, PT_ERROR_ARGUMENT, "mesh", n, "positions or indices are NULL");
-    if (!pti_check_material_id(scene, "mesh", n, material)) return -1;
-    if (!pti_check_coordinates(scene, "mesh", n, positions, vertex_count)) return -1;
-    if (normals && !pti_check_coordinates(scene, "mesh", n, normals, vertex_count)) return -1;
+        return !pti_scene_fail(scene, PT_ERROR_ARGUMENT, item, n, "positions or indices are NULL");
+    if (!pti_check_coordinates(scene, item, n, positions, vertex_count)) return 0;
+    if (normals && !pti_check_coordinates(scene, item, n, normals, vertex_count)) return 0;
+    for (i = 0; normals && i < vertex_count; i++)
+        if (normals[i].x == 0 && normals[i].y == 0 && normals[i].z == 0)
+            return !pti_scene_fail_value(scene, item, n, "normal", (double)i, "is zero");
     for (i = 0; uvs && i < vertex_count; i++)
         if (!pti_finite((double)uvs[i].x) || !pti_finite((double)uvs[i].y))
-            return pti_scene_fail(scene, PT_ERROR_SCENE, "mesh", n, "a texture coordinate is not finite");
-    for (i = 0; i / 3 < triangle_count; i++)
+            return !pti_scene_fail_value(scene, item, n, "texture coordinate", (double)i, "is not finite");
+    for (i = 0; i < 3 * triangle_count; i++)
         if (indices[i] >= vertex_count)
-            return pti_scene_fail_value(scene, "mesh", n, "index", (double)indices[i], "is beyond the vertices");
-    if (vertex_count > 0x7fffffffu - base || triangle_count > 0x7fffffffu - scene->triangle_count ||
-        !pti_reserve((void **)&scene->positions, &scene->position_capacity, (size_t)base + vertex_count, sizeof *positions, user) ||
-        !pti_reserve((void **)&scene->triangles, &scene->triangle_capacity, (size_t)scene->triangle_count + triangle_count,
+            return !pti_scene_fail_value(scene, item, n, "index", (double)indices[i], "is beyond the vertices");
+    return 1;
+}
+
+/* Adds a mesh that error messages call `item` number n. */
+static int pti_add_mesh(pt_scene *scene, const char *item, uint32_t n, const pt_vec3 *positions, const pt_vec3 *normals,
+                        const pt_vec2 *uvs, uint32_t vertex_count, const uint32_t *indices, uint32_t triangle_count, int material)
+{
+    uint32_t base = scene->position_count, i;
+    void *user = scene->alloc_user;
+    pt_mesh mesh;
+    int id = (int)scene->mesh_count;
+    if (!pti_check_material_id(scene, item, n, material)) return -1;
+    if (!pti_check_mesh(scene, item, n, positions, normals, uvs, vertex_count, indices, triangle_count)) return -1;
+    if (!pti_reserve(&scene->positions, &scene->position_capacity, (size_t)base + vertex_count, sizeof *positions, user) ||
+        !pti_reserve(&scene->triangles, &scene->triangle_capacity, (size_t)scene->triangle_count + triangle_count,
                      sizeof *scene->triangles, user) ||
-        (normals && !pti_reserve((void **)&scene->normals, &scene->normal_capacity, (size_t)scene->normal_count + vertex_count,
+        (normals && !pti_reserve(&scene->normals, &scene->normal_capacity, (size_t)scene->normal_count + vertex_count,
                                  sizeof *normals, user)) ||
-        (uvs && !pti_reserve((void **)&scene->uvs, &scene->uv_capacity, (size_t)scene->uv_count + vertex_count, sizeof *uvs, user)))
-        return pti_scene_no_memory(scene, "mesh", n);
+        (uvs && !pti_reserve(&scene->uvs, &scene->uv_capacity, (size_t)scene->uv_count + vertex_count, sizeof *uvs, user)))
+        return pti_scene_no_memory(scene, item, n);
     mesh.has_normals = normals != NULL;
     mesh.has_uvs = uvs != NULL;
     mesh.normal_offset = (int64_t)scene->normal_count - base;
     mesh.uv_offset = (int64_t)scene->uv_count - base;
-    if (PTI_PUSH(scene, "mesh", meshes, mesh_count, mesh_capacity, mesh) < 0) return -1;
+    if (PTI_PUSH(scene, item, meshes, mesh_count, mesh_capacity, mesh) < 0) return -1;
     for (i = 0; i < vertex_count; i++) {
         scene->positions[scene->position_count++] = positions[i];
         if (normals) scene->normals[scene->normal_count++] = normals[i];
@@ -4083,9 +4162,15 @@ PTDEF int pt_add_mesh(pt_scene *scene, const pt_vec3 *positions, const pt_vec3 *
         t->v[1] = base + indices[3 * (size_t)i + 1];
         t->v[2] = base + indices[3 * (size_t)i + 2];
         t->material = material;
-        t->mesh = (int)n;
+        t->mesh = id;
     }
-    return (int)n;
+    return id;
+}
+
+PTDEF int pt_add_mesh(pt_scene *scene, const pt_vec3 *positions, const pt_vec3 *normals, const pt_vec2 *uvs,
+                      uint32_t vertex_count, const uint32_t *indices, uint32_t triangle_count, int material)
+{
+    return pti_add_mesh(scene, "mesh", scene->mesh_count, positions, normals, uvs, vertex_count, indices, triangle_count, material);
 }
 
 PTDEF int pt_add_triangle(pt_scene *scene, pt_vec3 v0, pt_vec3 v1, pt_vec3 v2, int material)
@@ -4094,7 +4179,7 @@ PTDEF int pt_add_triangle(pt_scene *scene, pt_vec3 v0, pt_vec3 v1, pt_vec3 v2, i
     pt_vec3 v[3];
     int id = (int)scene->triangle_count;
     v[0] = v0; v[1] = v1; v[2] = v2;
-    return pt_add_mesh(scene, v, NULL, NULL, 3, indices, 1, material) < 0 ? -1 : id;
+    return pti_add_mesh(scene, "triangle", (uint32_t)id, v, NULL, NULL, 3, indices, 1, material) < 0 ? -1 : id;
 }
 
 PTDEF int pt_add_quad(pt_scene *scene, pt_vec3 v0, pt_vec3 v1, pt_vec3 v2, pt_vec3 v3, int material)
@@ -4103,7 +4188,7 @@ PTDEF int pt_add_quad(pt_scene *scene, pt_vec3 v0, pt_vec3 v1, pt_vec3 v2, pt_ve
     pt_vec3 v[4];
     int id = (int)scene->triangle_count;
     v[0] = v0; v[1] = v1; v[2] = v2; v[3] = v3;
-    return pt_add_mesh(scene, v, NULL, NULL, 4, indices, 2, material) < 0 ? -1 : id;
+    return pti_add_mesh(scene, "quad of triangle", (uint32_t)id, v, NULL, NULL, 4, indices, 2, material) < 0 ? -1 : id;
 }
 
 PTDEF int pt_add_parallelogram(pt_scene *scene, pt_vec3 corner, pt_vec3 edge1, pt_vec3 edge2, int material)
@@ -4280,7 +4365,7 @@ static void pti_collect_lights(pt_scene *scene)
         l.emission = scene->point_lights[i].intensity;
         if (!pti_rgb_black(l.emission)) scene->lights[scene->light_count++] = l;
     }
-    if (!pti_rgb_black(scene->environment)) {
+    if (PTI_HAS_ENVIRONMENT && !pti_rgb_black(scene->environment)) {
         memset(&l, 0, sizeof l);
         l.kind = PT_LIGHT_ENVIRONMENT;
         l.primitive = -1;
@@ -4431,10 +4516,12 @@ PTDEF pt_camera pt_camera_look_at(pt_vec3 eye, pt_vec3 target, pt_vec3 up, pt_re
     pti_d3 forward = pti_d_normalize(pti_d_between(eye, target)), right, upward;
     double bad;
     memset(&c, 0, sizeof c);
-    right = pti_d_normalize(pti_d_cross(forward, pti_d_normalize(pti_d_from(up))));
+    right = pti_d_cross(forward, pti_d_normalize(pti_d_from(up)));
+    if (!(pti_d_length(right) > 8 * PTI_UNIT_ROUNDOFF)) return c; /* parallel up to rounding, or NaN */
+    right = pti_d_normalize(right);
     upward = pti_d_cross(right, forward);
     if (pti_coordinate_bad(eye, &bad) || pti_coordinate_bad(target, &bad)) return c;
-    if (!(pti_d_length(upward) > 0.5) || !(vfov_deg > 0 && vfov_deg < 180)) return c;
+    if (!(vfov_deg > 0 && vfov_deg < 180)) return c;
     c.position = eye;
     c.forward = pti_d_to(forward);
     c.right = pti_d_to(right);
@@ -4585,10 +4672,10 @@ PTDEF pt_result pt_film_add_range(pt_film *film, uint32_t begin, uint32_t end)
     pt_range *r;
     uint32_t i, at;
     if (begin >= end) return PT_ERROR_ARGUMENT;
-    for (at = 0; at < film->range_count && film->ranges[at].end < begin; at++) {}
+    for (at = 0; at < film->range_count && film->ranges[at].end <= begin; at++) {}
     for (i = 0; i < film->range_count; i++)
         if (begin < film->ranges[i].end && film->ranges[i].begin < end) return PT_ERROR_MISMATCH;
-    if (!pti_reserve((void **)&film->ranges, &film->range_capacity, (size_t)film->range_count + 1, sizeof *film->ranges,
+    if (!pti_reserve(&film->ranges, &film->range_capacity, (size_t)film->range_count + 1, sizeof *film->ranges,
                      film->alloc_user))
         return PT_ERROR_MEMORY;
     r = film->ranges;
@@ -4806,7 +4893,7 @@ enum {
     PTI_WITH_SPECULAR = 1,
     PTI_WITH_ENVIRONMENT = 2,
     PTI_WITH_OBSERVER = 4,
-    PTI_WITH_ALL = 7
+    PTI_WITH_ALL = PTI_WITH_SPECULAR | (PTI_HAS_ENVIRONMENT ? PTI_WITH_ENVIRONMENT : 0) | (PTI_HAS_OBSERVER ? PTI_WITH_OBSERVER : 0)
 };
 
 /* A walk under way. */
@@ -4816,7 +4903,7 @@ typedef struct pti_walk {
     const pt_li_options *options;
     pt_ray ray;
     pt_hit hit;
-    pt_rgb beta;
+    pt_rgbd beta;           /* throughput                                                                  */
     double eta2;            /* product of eta^2 over the refractions so far                                */
     pt_rgbd sum;            /* radiance found                                                              */
     pt_real pdf_w;          /* density of the last direction,                                              */
@@ -4855,8 +4942,8 @@ static void pti_observe(const pti_walk *w, int edges, pt_rgbd value)
 /* Adds beta * value * weight. */
 PTI_INLINE void pti_contribute(pti_walk *w, pt_rgb value, double weight, int edges, const unsigned features)
 {
-    pt_rgbd c = pt_rgbd3((double)w->beta.r * (double)value.r * weight, (double)w->beta.g * (double)value.g * weight,
-                         (double)w->beta.b * (double)value.b * weight);
+    pt_rgbd c = pt_rgbd3(w->beta.r * (double)value.r * weight, w->beta.g * (double)value.g * weight,
+                         w->beta.b * (double)value.b * weight);
     w->sum.r += c.r;
     w->sum.g += c.g;
     w->sum.b += c.b;
@@ -4873,7 +4960,7 @@ PTI_INLINE double pti_emission_weight(const pti_walk *w, int light, const pt_hit
     double p;
     if (technique == PTI_TECHNIQUE_PLAIN || w->specular) return 1;
     if (technique == PTI_TECHNIQUE_LIGHT) return 0;
-    p = w->scene->lights[light].pmf * (double)pt_light_pdf_w(w->scene, light, w->ray.o, hit);
+    p = w->scene->lights[light].pmf * pt_light_pdf_w(w->scene, light, w->ray.o, hit);
     return pt_mis_weight((double)w->pdf_w, p, w->options->heuristic);
 }
 
@@ -4882,15 +4969,15 @@ PTI_INLINE void pti_direct(pti_walk *w, const pt_bsdf *bsdf, pt_vec3 wo, const u
 {
     uint32_t dimension = PT_DIM_EDGE(w->edges);
     pt_light_sample_result ls;
-    pt_real pmf, c;
+    pt_real c;
     pt_vec2 u;
     pt_rgb f;
     pt_ray shadow;
-    double p, weight;
+    double pmf, p, weight;
     int light;
     if ((features & PTI_WITH_SPECULAR) && !(bsdf->lobes & (PT_LOBE_DIFFUSE | PT_LOBE_GLOSSY))) return;
     pt_sampler_seek(w->sampler, dimension + PT_DIM_LIGHT_CHOICE);
-    light = pt_light_choose(w->scene, pt_sampler_1d(w->sampler), &pmf);
+    light = pt_light_choose(w->scene, pti_draw(w->sampler), &pmf);
     if (light < 0) return;
     pt_sampler_seek(w->sampler, dimension + PT_DIM_LIGHT);
     u = pt_sampler_2d(w->sampler);
@@ -4903,7 +4990,7 @@ PTI_INLINE void pti_direct(pti_walk *w, const pt_bsdf *bsdf, pt_vec3 wo, const u
     w->rays++;
     if (pt_occluded(w->scene, &shadow)) return;
     c = pti_fabs(pt_v3_dot(ls.wi, bsdf->frame.n));
-    p = (double)pmf * (double)ls.pdf_w;
+    p = pmf * ls.pdf_w;
     weight = technique == PTI_TECHNIQUE_MIS && !ls.delta
                  ? pt_mis_weight(p, (double)pt_bsdf_pdf_w(bsdf, wo, ls.wi, PT_RADIANCE), w->options->heuristic) : 1.0;
     weight *= (double)c / p;
@@ -4928,15 +5015,14 @@ PTI_INLINE int pti_extend(pti_walk *w, const pt_bsdf *bsdf, pt_vec3 wo, const un
     uint32_t dimension = PT_DIM_EDGE(w->edges);
     pt_bsdf_sample_result s;
     pt_vec2 u;
-    pt_real u_lobe = 0;
-    if (!bsdf->lobes) return 0;
+    double u_lobe = 0;
     pt_sampler_seek(w->sampler, dimension + PT_DIM_BSDF);
     u = pt_sampler_2d(w->sampler);
     s.eta = 1;
     if (features & PTI_WITH_SPECULAR) {
         if (bsdf->material->kind != PT_MATERIAL_DIFFUSE) {
             pt_sampler_seek(w->sampler, dimension + PT_DIM_LOBE);
-            u_lobe = pt_sampler_1d(w->sampler);
+            u_lobe = pti_draw(w->sampler);
         }
         if (!pt_bsdf_sample(bsdf, wo, u_lobe, u, PT_RADIANCE, &s)) return 0;
         w->specular = s.lobe == PT_LOBE_SPECULAR;
@@ -4949,9 +5035,9 @@ PTI_INLINE int pti_extend(pti_walk *w, const pt_bsdf *bsdf, pt_vec3 wo, const un
     if ((features & PTI_WITH_OBSERVER) && w->edges <= PT_WORD_MAX) w->letters[w->edges - 1] = pti_letter(s.lobe);
 #endif
     w->pdf_w = s.pdf_w;
-    w->beta = pt_rgb_mul(w->beta, s.weight);
+    w->beta = pt_rgbd3(w->beta.r * (double)s.weight.r, w->beta.g * (double)s.weight.g, w->beta.b * (double)s.weight.b);
     w->ray = pt_spawn_ray(w->hit.p, w->hit.p_error, w->hit.ng, s.wi);
-    return !pti_rgb_black(w->beta);
+    return w->beta.r > 0 || w->beta.g > 0 || w->beta.b > 0;
 }
 
 /* Russian roulette; 0 = the walk ends. */
@@ -4963,11 +5049,11 @@ PTI_INLINE int pti_roulette(pti_walk *w)
     double q;
     if (o->roulette == PT_ROULETTE_NONE || w->edges < start) return 1;
     if (constant) q = o->roulette_survival > 0 ? (double)o->roulette_survival : 0.8;
-    else q = (double)pt_rgb_max(w->beta) * w->eta2;
+    else q = fmax(w->beta.r, fmax(w->beta.g, w->beta.b)) * w->eta2;
     q = fmin(q, 1 - PTI_2_M24);
     pt_sampler_seek(w->sampler, PT_DIM_EDGE(w->edges) + PT_DIM_ROULETTE);
     if (!(pti_draw(w->sampler) < q)) return 0;
-    w->beta = pt_rgb3((pt_real)((double)w->beta.r / q), (pt_real)((double)w->beta.g / q), (pt_real)((double)w->beta.b / q));
+    w->beta = pt_rgbd3(w->beta.r / q, w->beta.g / q, w->beta.b / q);
     return 1;
 }
 
@@ -4989,7 +5075,7 @@ PTI_INLINE pt_rgbd pti_path(const pt_scene *scene, const pt_ray *ray, pt_sampler
     w.sampler = sampler;
     w.options = options;
     w.ray = *ray;
-    w.beta = pt_rgb_grey(1);
+    w.beta = pt_rgbd3(1, 1, 1);
     w.eta2 = 1;
     w.sum = pt_rgbd3(0, 0, 0);
     w.pdf_w = 0;
@@ -5016,6 +5102,7 @@ PTI_INLINE pt_rgbd pti_path(const pt_scene *scene, const pt_ray *ray, pt_sampler
         }
         if (w.edges == options->max_edges) break;
         bsdf = pt_bsdf_make(&scene->materials[w.hit.material], &w.hit);
+        if (!bsdf.lobes) break; /* black */
         if (technique != PTI_TECHNIQUE_PLAIN) pti_direct(&w, &bsdf, wo, features, technique);
         if (!pti_extend(&w, &bsdf, wo, features) || !pti_roulette(&w)) break;
         if ((w.edges & 0xffff) == 0 && options->poll && options->poll(options->poll_user)) {
@@ -5292,14 +5379,14 @@ static void pti_png_chunk(pti_writer *w, const char *type, const unsigned char *
 }
 
 /* The zlib stream of all rows; 0 = no memory. */
-static int pti_png_compress(const unsigned char *rgb, int width, int height, pti_bits *b)
+static int pti_png_compress(const unsigned char *rgb, int width, int height, void *user, pti_bits *b)
 {
     size_t stride = 3 * (size_t)width + 1, size = stride * (size_t)height;
-    unsigned char *raw = (unsigned char *)pti_alloc(size, 1, NULL);
-    size_t *heads = (size_t *)pti_alloc(PTI_HASH_SIZE, sizeof *heads, NULL);
+    unsigned char *raw = (unsigned char *)pti_alloc(size, 1, user);
+    size_t *heads = (size_t *)pti_alloc(PTI_HASH_SIZE, sizeof *heads, user);
     int y, ok;
     memset(b, 0, sizeof *b);
-    b->data = (unsigned char *)pti_alloc(size + size / 8 + 64, 1, NULL);
+    b->data = (unsigned char *)pti_alloc(size + size / 8 + 64, 1, user);
     ok = raw && heads && b->data;
     for (y = 0; ok && y < height; y++) pti_png_row(rgb, width, y, raw + (size_t)y * stride);
     if (ok) {
@@ -5309,13 +5396,13 @@ static int pti_png_compress(const unsigned char *rgb, int width, int height, pti
         pti_big_endian(b->data + b->size, pti_adler32(raw, size));
         b->size += 4;
     }
-    pti_free(raw, NULL);
-    pti_free(heads, NULL);
-    if (!ok) pti_free(b->data, NULL);
+    pti_free(raw, user);
+    pti_free(heads, user);
+    if (!ok) pti_free(b->data, user);
     return ok;
 }
 
-PTDEF pt_result pt_write_png_bytes(const char *path, const unsigned char *rgb, int width, int height)
+static pt_result pti_write_png(const char *path, const unsigned char *rgb, int width, int height, void *user)
 {
     static const unsigned char signature[8] = {137, 80, 78, 71, 13, 10, 26, 10};
     unsigned char header[13] = {0, 0, 0, 0, 0, 0, 0, 0, 8, 2, 0, 0, 0}; /* 8 bits, RGB */
@@ -5323,9 +5410,9 @@ PTDEF pt_result pt_write_png_bytes(const char *path, const unsigned char *rgb, i
     pti_bits b;
     if (!rgb || !pti_image_size_ok(width, height)) return PT_ERROR_ARGUMENT;
     if (3.4 * width * height > 2147483647.0) return PT_ERROR_ARGUMENT; /* a chunk is shorter than 2^31 */
-    if (!pti_png_compress(rgb, width, height, &b)) return PT_ERROR_MEMORY;
+    if (!pti_png_compress(rgb, width, height, user, &b)) return PT_ERROR_MEMORY;
     if (!pti_writer_open(&w, path)) {
-        pti_free(b.data, NULL);
+        pti_free(b.data, user);
         return PT_ERROR_FILE;
     }
     pti_big_endian(header, (uint32_t)width);
@@ -5334,8 +5421,13 @@ PTDEF pt_result pt_write_png_bytes(const char *path, const unsigned char *rgb, i
     pti_png_chunk(&w, "IHDR", header, 13);
     pti_png_chunk(&w, "IDAT", b.data, b.size);
     pti_png_chunk(&w, "IEND", header, 0);
-    pti_free(b.data, NULL);
+    pti_free(b.data, user);
     return pti_writer_close(&w, path);
+}
+
+PTDEF pt_result pt_write_png_bytes(const char *path, const unsigned char *rgb, int width, int height)
+{
+    return pti_write_png(path, rgb, width, height, NULL);
 }
 
 /* The film as 8-bit sRGB; NULL = no memory. */
@@ -5347,27 +5439,27 @@ static unsigned char *pti_film_bytes(const pt_film *film, double exposure)
     return rgb;
 }
 
-static pt_result pti_write_film(const char *path, const pt_film *film, double exposure,
-                                pt_result (*write)(const char *, const unsigned char *, int, int))
+static pt_result pti_write_film(const char *path, const pt_film *film, double exposure, int png)
 {
     unsigned char *rgb;
     pt_result result;
     if (!film->half[0] || !(exposure >= 0) || !pti_finite(exposure)) return PT_ERROR_ARGUMENT;
     rgb = pti_film_bytes(film, exposure);
     if (!rgb) return PT_ERROR_MEMORY;
-    result = write(path, rgb, film->width, film->height);
+    if (png) result = pti_write_png(path, rgb, film->width, film->height, film->alloc_user);
+    else result = pt_write_ppm_bytes(path, rgb, film->width, film->height);
     pti_free(rgb, film->alloc_user);
     return result;
 }
 
 PTDEF pt_result pt_write_ppm(const char *path, const pt_film *film, double exposure)
 {
-    return pti_write_film(path, film, exposure, pt_write_ppm_bytes);
+    return pti_write_film(path, film, exposure, 0);
 }
 
 PTDEF pt_result pt_write_png(const char *path, const pt_film *film, double exposure)
 {
-    return pti_write_film(path, film, exposure, pt_write_png_bytes);
+    return pti_write_film(path, film, exposure, 1);
 }
 
 PTDEF pt_result pt_write_pfm(const char *path, const pt_film *film)
@@ -5484,6 +5576,11 @@ static void pti_hash_text(uint64_t *h, const char *text)
 static void pti_hash_scene(uint64_t *h, const pt_scene *s)
 {
     uint32_t i;
+    pti_hash_word(h, (uint64_t)s->material_count << 32 | s->position_count);
+    pti_hash_word(h, (uint64_t)s->normal_count << 32 | s->triangle_count);
+    pti_hash_word(h, (uint64_t)s->sphere_count << 32 | s->parallelogram_count);
+    for (i = 0; i < s->mesh_count; i++)
+        pti_hash_word(h, s->meshes[i].has_normals ? (uint64_t)s->meshes[i].normal_offset : UINT64_MAX);
     for (i = 0; i < s->material_count; i++) {
         pti_hash_word(h, (uint64_t)s->materials[i].kind);
         pti_hash_rgb(h, s->materials[i].albedo);
@@ -5495,6 +5592,7 @@ static void pti_hash_scene(uint64_t *h, const pt_scene *s)
     for (i = 0; i < s->triangle_count; i++) {
         pti_hash_word(h, (uint64_t)s->triangles[i].v[0] << 32 | s->triangles[i].v[1]);
         pti_hash_word(h, (uint64_t)s->triangles[i].v[2] << 32 | (uint32_t)s->triangles[i].material);
+        pti_hash_word(h, (uint64_t)s->triangles[i].mesh);
     }
     for (i = 0; i < s->sphere_count; i++) {
         pti_hash_vec(h, s->spheres[i].centre);
@@ -5515,7 +5613,7 @@ static void pti_hash_scene(uint64_t *h, const pt_scene *s)
 }
 
 /* What the bits of a film depend on. `planned` is the sample count of the stratified sampler, else 0. */
-static uint64_t pti_fingerprint(const pt_scene *scene, const pt_render_desc *d, const pt_method *method, uint32_t planned)
+static uint64_t pti_fingerprint(const pt_scene *scene, const pt_render_desc *d, const pt_method *method, const char *body, uint32_t planned)
 {
     uint64_t h = sizeof(pt_real);
     const pt_camera *c = &d->camera;
@@ -5529,6 +5627,7 @@ static uint64_t pti_fingerprint(const pt_scene *scene, const pt_render_desc *d, 
     pti_hash_double(&h, (double)c->near_distance);
     pti_hash_word(&h, (uint64_t)d->width << 32 | (uint64_t)d->height);
     pti_hash_text(&h, method->name);
+    pti_hash_text(&h, body);
     pti_hash_word(&h, (uint64_t)d->sampler << 32 | planned);
     pti_hash_word(&h, d->seed);
     pti_hash_word(&h, (uint64_t)d->li.max_edges << 32 | (uint64_t)d->li.roulette << 16 | (uint64_t)d->li.heuristic);
@@ -5548,94 +5647,74 @@ typedef struct pti_pass {
     pt_film *film;          /* the copy that the pass works on                                             */
     uint32_t begin, end;    /* samples                                                                     */
     uint32_t planned;       /* samples a half (stratified)                                                 */
-    int tile, columns, tiles;
-    uint64_t *rays, *nonfinite; /* a slot for each tile                                                    */
-    double cpu_start;
-    int cancel;             /* 1: the user wants to stop, 2: a path outlasted the time budget              */
-    /* progress, under the lock */
-#if PTI_HAS_THREADS
-    pti_mutex lock;
-#endif
-    int tiles_done;
-    uint64_t rays_done;
-    double start, last_call, passed_spp, target_spp, relmse;
+    int columns, tiles;
+    double start, cpu_start, last_call, relmse;
+    uint64_t rays_before;   /* rays of the passes before this one                                          */
+    pti_counter rays, pixels, nonfinite; /* of this pass so far                                            */
+    pti_counter asking;     /* taken by the thread that asks the user                                      */
+    pti_counter cancel;     /* 1: the user wants to stop, 2: a path outlasted the time budget              */
 } pti_pass;
 
-static void pti_pass_lock(pti_pass *p)
+static int pti_rgbd_finite(pt_rgbd c)
 {
-#if PTI_HAS_THREADS
-    pti_lock(&p->lock);
-#else
-    (void)p;
-#endif
+    return pti_finite(c.r) && pti_finite(c.g) && pti_finite(c.b);
 }
-static void pti_pass_unlock(pti_pass *p)
+
+static void pti_add3(double *sum, double r, double g, double b)
 {
-#if PTI_HAS_THREADS
-    pti_unlock(&p->lock);
-#else
-    (void)p;
-#endif
+    sum[0] += r;
+    sum[1] += g;
+    sum[2] += b;
 }
 
 /* One sample of one pixel, added to the film. */
-static void pti_render_sample(pti_pass *p, pt_sampler *sampler, int x, int y, uint32_t sample, uint64_t *rays, uint64_t *nonfinite)
+static void pti_render_sample(pti_pass *p, pt_sampler *sampler, int x, int y, uint32_t sample, pt_li_info *info)
 {
     const pt_render_desc *d = p->desc;
+    pt_film *film = p->film;
     size_t pixel = (size_t)y * (size_t)d->width + (size_t)x;
-    int half = d->single_net ? 0 : (int)(sample & 1u);
-    double *sum = p->film->half[half] + 3 * pixel;
+    uint32_t half = d->single_net ? 0 : sample & 1u;
     pt_vec2 u, lens = pt_v2(0, 0);
-    pt_li_info info;
     pt_rgbd L;
     pt_ray ray;
     /* Each half is a net of its own: another stream. */
-    pt_sampler_start(sampler, 2 * (uint64_t)pixel + (uint64_t)half, d->single_net ? sample : sample >> 1);
+    pt_sampler_start(sampler, 2 * (uint64_t)pixel + half, d->single_net ? sample : sample >> 1);
     u = pt_sampler_2d(sampler);
     if (d->camera.lens_radius > 0) lens = pt_sampler_2d(sampler);
     ray = pt_camera_ray(&d->camera, (pt_real)d->width / (pt_real)d->height, ((pt_real)x + u.x) / (pt_real)d->width,
                         ((pt_real)y + u.y) / (pt_real)d->height, lens);
-    info.rays = 0;
-    L = p->li(p->scene, &ray, sampler, &p->options, &info);
-    *rays += info.rays;
-    if (info.cancelled) return; /* and with it the whole pass */
-    if (pti_finite(L.r) && pti_finite(L.g) && pti_finite(L.b)) {
-        sum[0] += L.r;
-        sum[1] += L.g;
-        sum[2] += L.b;
-    } else {
-        ++*nonfinite;
-    }
-    if (p->film->albedo && info.hit) {
-        const pt_rgb a = info.albedo;
-        const pt_vec3 n = info.normal;
-        double *albedo = p->film->albedo + 3 * pixel, *normal = p->film->normal + 3 * pixel;
-        albedo[0] += (double)a.r; albedo[1] += (double)a.g; albedo[2] += (double)a.b;
-        normal[0] += (double)n.x; normal[1] += (double)n.y; normal[2] += (double)n.z;
-        p->film->depth[pixel] += (double)info.depth;
-    }
+    L = p->li(p->scene, &ray, sampler, &p->options, info);
+    if (info->cancelled) return; /* and with it the whole pass */
+    if (pti_rgbd_finite(L)) pti_add3(film->half[half] + 3 * pixel, L.r, L.g, L.b);
+    else PTI_ADD(&p->nonfinite, 1);
+    if (!film->albedo || !info->hit) return;
+    pti_add3(film->albedo + 3 * pixel, (double)info->albedo.r, (double)info->albedo.g, (double)info->albedo.b);
+    pti_add3(film->normal + 3 * pixel, (double)info->normal.x, (double)info->normal.y, (double)info->normal.z);
+    film->depth[pixel] += (double)info->depth;
 }
 
-/* Calls the user's callback if it is time; its wish to stop is noted. */
-static void pti_report_progress(pti_pass *p)
+/* Calls the user's callback if it is time and no other thread does; a wish to stop is noted. */
+static void pti_ask_user(pti_pass *p)
 {
+    const pt_render_desc *d = p->desc;
+    double wall, share;
     pt_progress now;
-    double wall = pt_wall_seconds(), done;
-    if (!p->desc->progress || wall - p->last_call < 0.1) return;
-    p->last_call = wall;
-    now.spp = p->passed_spp + (double)(p->end - p->begin) * p->tiles_done / p->tiles;
-    now.spp_target = p->target_spp;
-    now.seconds = wall - p->start;
-    now.rays_per_second = now.seconds > 0 ? (double)p->rays_done / now.seconds : 0;
-    now.relmse = p->relmse;
-    now.seconds_left = -1;
-    done = p->target_spp > 0 ? now.spp / p->target_spp : 0;
-    if (done > 0) now.seconds_left = now.seconds * (1 - done) / done;
-    if (p->desc->seconds > 0) {
-        double left = fmax(0, p->desc->seconds - now.seconds);
-        if (now.seconds_left < 0 || left < now.seconds_left) now.seconds_left = left;
+    if (!d->progress || !PTI_TAKE(&p->asking)) return;
+    wall = pt_wall_seconds();
+    if (wall - p->last_call >= 0.1) {
+        p->last_call = wall;
+        share = (double)PTI_LOAD(&p->pixels) / ((double)d->width * d->height);
+        now.spp = p->begin - d->first_sample + share * (p->end - p->begin);
+        now.spp_target = d->spp;
+        now.seconds = wall - p->start;
+        now.rays_per_second = now.seconds > 0 ? ((double)p->rays_before + (double)PTI_LOAD(&p->rays)) / now.seconds : 0;
+        now.relmse = p->relmse;
+        now.seconds_left = now.spp > 0 && d->spp ? now.seconds * (d->spp - now.spp) / now.spp : HUGE_VAL;
+        if (d->seconds > 0) now.seconds_left = fmin(now.seconds_left, fmax(0, d->seconds - now.seconds));
+        if (!pti_finite(now.seconds_left)) now.seconds_left = -1;
+        if (d->progress(d->progress_user, &now)) PTI_STORE(&p->cancel, 1);
     }
-    if (p->desc->progress(p->desc->progress_user, &now)) PTI_STORE(&p->cancel, 1);
+    PTI_STORE(&p->asking, 0);
 }
 
 /* Asked from inside long paths: is it time to give up this pass? */
@@ -5643,10 +5722,11 @@ static int pti_poll(void *context)
 {
     pti_pass *p = (pti_pass *)context;
     const pt_render_desc *d = p->desc;
+    pti_ask_user(p);
     if (d->li.poll && d->li.poll(d->li.poll_user)) PTI_STORE(&p->cancel, 1);
     if (d->seconds > 0 && pt_wall_seconds() - p->start >= d->seconds) PTI_STORE(&p->cancel, 2);
     if (d->cpu_seconds > 0 && pt_cpu_seconds() - p->cpu_start >= d->cpu_seconds) PTI_STORE(&p->cancel, 2);
-    return PTI_LOAD(&p->cancel);
+    return PTI_LOAD(&p->cancel) != 0;
 }
 
 /* A task: one tile, all samples of the pass. */
@@ -5654,138 +5734,161 @@ static void pti_render_tile(void *context, int index)
 {
     pti_pass *p = (pti_pass *)context;
     const pt_render_desc *d = p->desc;
-    int x0 = (index % p->columns) * p->tile, y0 = (index / p->columns) * p->tile;
-    int x1 = x0 + p->tile < d->width ? x0 + p->tile : d->width, y1 = y0 + p->tile < d->height ? y0 + p->tile : d->height;
+    int x0 = (index % p->columns) * d->tile, y0 = (index / p->columns) * d->tile;
+    int x1 = x0 + d->tile < d->width ? x0 + d->tile : d->width, y1 = y0 + d->tile < d->height ? y0 + d->tile : d->height;
     pt_sampler sampler = pt_sampler_make(d->sampler, d->seed, p->planned);
-    uint64_t rays = 0, nonfinite = 0;
+    pt_li_info info;
     uint32_t s;
     int x, y;
     for (y = y0; y < y1; y++)
         for (x = x0; x < x1; x++) {
-            if (PTI_LOAD(&p->cancel)) return;
-            for (s = p->begin; s < p->end; s++) pti_render_sample(p, &sampler, x, y, s, &rays, &nonfinite);
+            info.rays = 0;
+            for (s = p->begin; s < p->end && !PTI_LOAD(&p->cancel); s++) pti_render_sample(p, &sampler, x, y, s, &info);
+            PTI_ADD(&p->rays, (pti_counter)info.rays);
+            PTI_ADD(&p->pixels, 1);
+            pti_ask_user(p);
         }
-    p->rays[index] = rays;
-    p->nonfinite[index] = nonfinite;
-    pti_pass_lock(p);
-    p->tiles_done++;
-    p->rays_done += rays;
-    pti_report_progress(p);
-    pti_pass_unlock(p);
 }
 
-/* Copies the sums of a film of the same shape. */
-static void pti_film_copy_sums(pt_film *to, const pt_film *from)
+/* The sums of a film, in the order of `layer`; NULL where a layer is not there. */
+static double **pti_film_layer(pt_film *film, int layer, size_t *channels)
 {
-    size_t n = (size_t)from->width * (size_t)from->height * sizeof(double);
-    memcpy(to->half[0], from->half[0], 3 * n);
-    memcpy(to->half[1], from->half[1], 3 * n);
-    if (from->albedo) memcpy(to->albedo, from->albedo, 3 * n);
-    if (from->normal) memcpy(to->normal, from->normal, 3 * n);
-    if (from->depth) memcpy(to->depth, from->depth, n);
+    double **layers[5];
+    layers[0] = &film->half[0];
+    layers[1] = &film->half[1];
+    layers[2] = &film->albedo;
+    layers[3] = &film->normal;
+    layers[4] = &film->depth;
+    *channels = layer == 4 ? 1 : 3;
+    return layers[layer];
 }
 
-static void pti_swap_sums(double **a, double **b)
+/* Renders samples begin..end on a copy of the sums; if all went well, the copy becomes the film. */
+static pt_result pti_render_pass(pti_pass *p, pt_film *film, uint32_t begin, uint32_t end)
 {
-    double *t = *a;
-    *a = *b;
-    *b = t;
-}
-
-/* A completed pass becomes the film. */
-static pt_result pti_accept_pass(pti_pass *p, pt_film *film)
-{
-    pt_film *copy = p->film;
-    uint32_t odd = p->end / 2 - p->begin / 2; /* odd samples in the range */
-    pt_result result = pt_film_add_range(film, p->begin, p->end);
-    int i;
-    if (result != PT_OK) return result;
-    if (p->desc->single_net) odd = 0;
-    film->samples[0] += p->end - p->begin - odd;
-    film->samples[1] += odd;
-    pti_swap_sums(&film->half[0], &copy->half[0]);
-    pti_swap_sums(&film->half[1], &copy->half[1]);
-    pti_swap_sums(&film->albedo, &copy->albedo);
-    pti_swap_sums(&film->normal, &copy->normal);
-    pti_swap_sums(&film->depth, &copy->depth);
-    for (i = 0; i < p->tiles; i++) film->nonfinite += p->nonfinite[i];
-    return PT_OK;
-}
-
-static pt_result pti_render_pass(pti_pass *p, pt_film *film, uint32_t begin, uint32_t end, int threads)
-{
+    const pt_render_desc *d = p->desc;
+    size_t pixels = (size_t)d->width * (size_t)d->height, channels;
+    uint32_t odd = d->single_net ? 0 : end / 2 - begin / 2; /* odd samples in the range */
+    pt_result result;
+    int k;
     p->begin = begin;
     p->end = end;
-    p->tiles_done = 0;
-    pti_film_copy_sums(p->film, film);
-    if (p->desc->parallel) p->desc->parallel(p->desc->parallel_user, p->tiles, pti_render_tile, p);
-    else pti_parallel(threads, p->tiles, pti_render_tile, p);
-    if (PTI_LOAD(&p->cancel)) return PT_ERROR_CANCELLED;
-    return pti_accept_pass(p, film);
+    p->rays = p->pixels = p->nonfinite = 0;
+    for (k = 0; k < 5; k++) {
+        double *from = *pti_film_layer(film, k, &channels), *to = *pti_film_layer(p->film, k, &channels);
+        if (from) memcpy(to, from, pixels * channels * sizeof *to);
+    }
+    if (d->parallel) d->parallel(d->parallel_user, p->tiles, pti_render_tile, p);
+    else pti_parallel(d->threads, p->tiles, pti_render_tile, p);
+    p->rays_before += (uint64_t)p->rays;
+    if (p->cancel) return PT_ERROR_CANCELLED;
+    result = pt_film_add_range(film, begin, end);
+    if (result != PT_OK) return result;
+    film->samples[0] += end - begin - odd;
+    film->samples[1] += odd;
+    film->nonfinite += (uint64_t)p->nonfinite;
+    for (k = 0; k < 5; k++) {
+        double **a = pti_film_layer(film, k, &channels), **b = pti_film_layer(p->film, k, &channels), *swap = *a;
+        *a = *b;
+        *b = swap;
+    }
+    return PT_OK;
 }
 
 /* --- the sequence of passes --- */
 
-/* Appends a row to the report. */
-static pt_result pti_report_row(pt_report *report, const pt_film *film, const pt_render_desc *desc, const pt_report *now)
+/* Brings the report up to date, and appends a row: after 1, 2, 4, ... samples and at the end. */
+static pt_result pti_report_pass(pti_pass *p, pt_report *report, const pt_film *film, int row_due)
 {
+    pt_error error;
+    int estimated = pt_film_error_estimate(film, &error);
+    p->relmse = estimated ? error.relmse : -1;
+    report->spp = pt_film_spp(film);
 #if PTI_HAS_REPORT
-    pt_report_row *row;
-    double relmse;
-    if (!pti_reserve((void **)&report->rows, &report->row_capacity, (size_t)report->row_count + 1, sizeof *report->rows,
-                     report->alloc_user))
-        return PT_ERROR_MEMORY;
-    row = &report->rows[report->row_count++];
-    memset(row, 0, sizeof *row);
-    row->spp = now->spp;
-    row->cpu_seconds = now->cpu_seconds;
-    row->wall_seconds = now->wall_seconds;
-    row->rays = now->rays;
-    row->estimated = pt_film_error_estimate(film, &row->error);
-    row->has_true_error = desc->reference != NULL;
-    if (desc->reference) {
-        pt_film_error(film, desc->reference, &row->true_error);
-        row->true_error.relmse_001 -= desc->reference_mse_001;
+    if (row_due && (report->row_count == 0 || report->rows[report->row_count - 1].spp != report->spp)) {
+        const pt_render_desc *d = p->desc;
+        pt_report_row *row;
+        double relmse = error.relmse;
+        if (!pti_reserve(&report->rows, &report->row_capacity, (size_t)report->row_count + 1, sizeof *row, report->alloc_user))
+            return PT_ERROR_MEMORY;
+        row = &report->rows[report->row_count++];
+        memset(row, 0, sizeof *row);
+        row->spp = report->spp;
+        row->cpu_seconds = report->cpu_seconds;
+        row->wall_seconds = report->wall_seconds;
+        row->rays = report->rays;
+        row->estimated = estimated;
+        row->error = error;
+        row->has_true_error = d->reference != NULL;
+        if (d->reference) {
+            pt_film_error(film, d->reference, &row->true_error);
+            row->true_error.relmse_001 -= d->reference_mse_001;
+            relmse = row->true_error.relmse;
+        }
+        row->efficiency = relmse > 0 && row->cpu_seconds > 0 ? 1 / (relmse * row->cpu_seconds) : 0;
     }
-    relmse = row->has_true_error ? row->true_error.relmse : row->error.relmse;
-    row->efficiency = relmse > 0 && row->cpu_seconds > 0 ? 1 / (relmse * row->cpu_seconds) : 0;
 #else
-    (void)report;
-    (void)film;
-    (void)desc;
-    (void)now;
+    (void)row_due;
 #endif
     return PT_OK;
 }
 
-/* Everything a desc can have wrong; fills in defaults. */
-static pt_result pti_check_desc(const pt_scene *scene, pt_render_desc *d, const pt_method **method)
+/* Unit vectors at right angles, up to the rounding of their making? */
+static int pti_camera_ok(const pt_camera *c)
 {
-    const pt_li_options *o = &d->li;
-    int timed = d->seconds > 0 || d->cpu_seconds > 0 || d->target_error > 0;
-    if (!scene->committed) return scene->error != PT_OK ? scene->error : PT_ERROR_NOT_COMMITTED;
+    const double e = 64 * PTI_UNIT_ROUNDOFF;
+    pti_d3 f = pti_d_from(c->forward), r = pti_d_from(c->right), u = pti_d_from(c->up);
+    double bad;
+    return !pti_coordinate_bad(c->position, &bad) && fabs(pti_d_dot(f, f) - 1) < e && fabs(pti_d_dot(r, r) - 1) < e &&
+           fabs(pti_d_dot(u, u) - 1) < e && fabs(pti_d_dot(f, r)) < e && fabs(pti_d_dot(f, u)) < e && fabs(pti_d_dot(r, u)) < e;
+}
+
+static void pti_fill_defaults(pt_render_desc *d)
+{
     if (d->width == 0) d->width = 256;
     if (d->height == 0) d->height = 256;
     if (d->tile == 0) d->tile = 16;
-    if (d->spp == 0 && !timed) d->spp = 64;
+    if (d->spp == 0 && !(d->seconds > 0 || d->cpu_seconds > 0 || d->target_error > 0)) d->spp = 64;
     if (d->threads == 0) d->threads = pt_hardware_threads();
-    if (d->width < 1 || d->height < 1 || d->width > 65536 || d->height > 65536) return PT_ERROR_ARGUMENT;
-    if (d->tile < 1 || d->tile > 65536 || d->threads < 1) return PT_ERROR_ARGUMENT;
-    if (!(d->camera.tan_half > 0) || !pti_finite((double)d->camera.tan_half)) return PT_ERROR_ARGUMENT;
-    if (!(d->camera.lens_radius >= 0) || !pti_finite((double)d->camera.lens_radius)) return PT_ERROR_ARGUMENT;
-    if (!(d->camera.focus_distance >= 0) || !pti_finite((double)d->camera.focus_distance)) return PT_ERROR_ARGUMENT;
-    if (!(d->camera.near_distance >= 0) || !pti_finite((double)d->camera.near_distance)) return PT_ERROR_ARGUMENT;
-    if (!(d->seconds >= 0) || !(d->cpu_seconds >= 0) || !(d->target_error >= 0)) return PT_ERROR_ARGUMENT;
-    if ((int)d->sampler < 0 || d->sampler >= PT_SAMPLER_GIVEN) return PT_ERROR_ARGUMENT;
-    if (d->sampler == PT_SAMPLER_STRATIFIED && timed) return PT_ERROR_ARGUMENT; /* needs the count beforehand */
-    if (d->spp > UINT32_MAX - d->first_sample) return PT_ERROR_ARGUMENT;
-    if (o->max_edges < 0 || o->roulette_start < 0) return PT_ERROR_ARGUMENT;
-    if ((int)o->roulette < 0 || o->roulette > PT_ROULETTE_NONE || (int)o->heuristic < 0 || o->heuristic > PT_HEURISTIC_BALANCE)
-        return PT_ERROR_ARGUMENT;
-    if (!(o->roulette_survival >= 0 && o->roulette_survival < 1)) return PT_ERROR_ARGUMENT;
-    if (o->roulette == PT_ROULETTE_NONE && o->max_edges == 0) return PT_ERROR_ARGUMENT; /* would never end */
-    *method = pt_method_find(d->method);
-    return *method ? PT_OK : PT_ERROR_ARGUMENT;
+    if (d->threads > PTI_MAX_THREADS) d->threads = PTI_MAX_THREADS;
+}
+
+static int pti_not_negative(double x)
+{
+    return x >= 0 && pti_finite(x);
+}
+
+/* What is wrong with a desc (its defaults filled in), NULL if nothing. */
+static const char *pti_check_desc(const pt_render_desc *d)
+{
+    const pt_camera *c = &d->camera;
+    const pt_li_options *o = &d->li;
+    int timed = d->seconds > 0 || d->cpu_seconds > 0 || d->target_error > 0;
+    if (d->width < 1 || d->width > 65536) return "desc.width is not in 1..65536";
+    if (d->height < 1 || d->height > 65536) return "desc.height is not in 1..65536";
+    if (d->tile < 1 || d->tile > 65536) return "desc.tile is not in 1..65536";
+    if ((d->width / d->tile + 1.0) * (d->height / d->tile + 1.0) > 2147483647.0) return "desc.tile is too small for the picture";
+    if (d->threads < 1) return "desc.threads is negative";
+    if (!(c->tan_half > 0) || !pti_finite((double)c->tan_half)) return "desc.camera is not set, or its view is not possible";
+    if (!pti_camera_ok(c)) return "desc.camera: position is not finite, or axes are not orthonormal";
+    if (!pti_not_negative((double)c->lens_radius)) return "desc.camera.lens_radius is negative or not finite";
+    if (!pti_not_negative((double)c->focus_distance)) return "desc.camera.focus_distance is negative or not finite";
+    if (!pti_not_negative((double)c->near_distance)) return "desc.camera.near_distance is negative or not finite";
+    if (!(d->seconds >= 0)) return "desc.seconds is negative";
+    if (!(d->cpu_seconds >= 0)) return "desc.cpu_seconds is negative";
+    if (!(d->target_error >= 0)) return "desc.target_error is negative";
+    if ((int)d->sampler < 0 || d->sampler >= PT_SAMPLER_GIVEN) return "desc.sampler is not sobol, independent or stratified";
+    if (d->sampler == PT_SAMPLER_STRATIFIED && timed) return "the stratified sampler needs a sample count, not a time or error budget";
+    if (d->single_net && d->target_error > 0) return "desc.single_net has no error estimate for desc.target_error";
+    if (d->spp > UINT32_MAX - 1 - d->first_sample) return "desc.first_sample + desc.spp is beyond 2^32 - 2";
+    if (o->max_edges < 0) return "desc.li.max_edges is negative";
+    if (o->roulette_start < 0) return "desc.li.roulette_start is negative";
+    if ((int)o->roulette < 0 || o->roulette > PT_ROULETTE_NONE) return "desc.li.roulette is unknown";
+    if ((int)o->heuristic < 0 || o->heuristic > PT_HEURISTIC_BALANCE) return "desc.li.heuristic is unknown";
+    if (!(o->roulette_survival >= 0 && o->roulette_survival < 1)) return "desc.li.roulette_survival is not in [0,1)";
+    if (o->roulette == PT_ROULETTE_NONE && o->max_edges == 0) return "without roulette desc.li.max_edges must end the paths";
+    if (!pt_method_find(d->method)) return "desc.method is unknown";
+    return NULL;
 }
 
 /* An empty film is made; a filled one must be of this picture and reach from first_sample without a gap. */
@@ -5805,59 +5908,59 @@ static pt_result pti_prepare_film(pt_film *film, const pt_render_desc *d, uint64
 /* The end of the next pass: doubling, cut to what the remaining time is likely to allow. */
 static uint32_t pti_next_end(const pt_render_desc *d, uint32_t done, uint32_t made, double wall, double cpu)
 {
-    uint32_t end = 1, most = d->spp ? d->spp : UINT32_MAX - d->first_sample;
+    uint64_t end = 1, most = d->spp ? d->spp : UINT32_MAX - 1 - d->first_sample;
     double left = HUGE_VAL;
-    while (end <= done && end < 0x80000000u) end *= 2;
+    while (end <= done) end *= 2;
     if (end > most) end = most;
     if (made > 0 && d->seconds > 0) left = (d->seconds - wall) * made / wall;
     if (made > 0 && d->cpu_seconds > 0) left = fmin(left, (d->cpu_seconds - cpu) * made / cpu);
-    if (left < end - done) end = done + (left > 1 ? (uint32_t)left : 1);
-    return end;
+    if (left < (double)(end - done)) end = done + (left > 1 ? (uint64_t)left : 1);
+    return (uint32_t)end;
 }
 
-/* Renders passes until a budget ends; `now` counts. */
-static pt_result pti_run_passes(pti_pass *p, pt_film *film, pt_report *report, pt_report *now)
+/* Which budget is used up after `made` new samples; NULL = none. */
+static const char *pti_budget_used(const pti_pass *p, const pt_report *report, uint32_t made)
 {
     const pt_render_desc *d = p->desc;
-    uint32_t done = pt_film_spp(film), made = 0, end;
+    if (d->spp && report->spp >= d->spp) return "samples";
+    if (made == 0) return NULL;
+    if (d->seconds > 0 && report->wall_seconds >= d->seconds) return "seconds";
+    if (d->cpu_seconds > 0 && report->cpu_seconds >= d->cpu_seconds) return "CPU seconds";
+    if (d->target_error > 0 && p->relmse >= 0 && sqrt(p->relmse) < d->target_error) return "error";
+    return NULL;
+}
+
+/* Renders passes until a budget is used up. */
+static pt_result pti_run_passes(pti_pass *p, pt_film *film, pt_report *report)
+{
+    const pt_render_desc *d = p->desc;
+    uint64_t nonfinite = film->nonfinite;
+    uint32_t first = pt_film_spp(film), done, end;
     pt_result result = PT_OK;
-    pt_error error;
-    for (;;) {
-        if (d->spp && done >= d->spp) now->stopped_by = "samples";
-        else if (made && d->seconds > 0 && now->wall_seconds >= d->seconds) now->stopped_by = "seconds";
-        else if (made && d->cpu_seconds > 0 && now->cpu_seconds >= d->cpu_seconds) now->stopped_by = "CPU seconds";
-        else if (made && d->target_error > 0 && p->relmse >= 0 && sqrt(p->relmse) < d->target_error) now->stopped_by = "error";
-        if (now->stopped_by) break;
-        end = pti_next_end(d, done, made, now->wall_seconds, now->cpu_seconds);
+    report->spp = first;
+    while (result == PT_OK && !(report->stopped_by = pti_budget_used(p, report, report->spp - first))) {
+        done = report->spp;
+        end = pti_next_end(d, done, done - first, report->wall_seconds, report->cpu_seconds);
         if (end <= done) {
-            now->stopped_by = "sample indices used up";
+            report->stopped_by = "sample indices used up";
             break;
         }
-        p->passed_spp = done;
-        p->target_spp = d->spp;
-        result = pti_render_pass(p, film, d->first_sample + done, d->first_sample + end, d->threads);
-        now->wall_seconds = pt_wall_seconds() - p->start;
-        now->cpu_seconds = pt_cpu_seconds() - p->cpu_start;
-        now->rays = p->rays_done;
-        if (result != PT_OK) {
-            now->stopped_by = result != PT_ERROR_CANCELLED ? "memory" : PTI_LOAD(&p->cancel) == 2 ? "time, inside a path" : "cancelled";
-            if (PTI_LOAD(&p->cancel) == 2) result = PT_OK; /* a budget is no failure */
-            break;
-        }
-        made += end - done;
-        done = end;
-        now->spp = done;
-        p->relmse = pt_film_error_estimate(film, &error) ? error.relmse : -1;
-        if ((done & (done - 1)) == 0 || done == d->spp) result = pti_report_row(report, film, d, now);
-        if (result != PT_OK) break;
+        result = pti_render_pass(p, film, d->first_sample + done, d->first_sample + end);
+        report->wall_seconds = pt_wall_seconds() - p->start;
+        report->cpu_seconds = pt_cpu_seconds() - p->cpu_start;
+        report->rays = p->rays_before;
+        report->nonfinite = film->nonfinite - nonfinite;
+        if (result == PT_OK) result = pti_report_pass(p, report, film, (end & (end - 1)) == 0);
     }
-    if (result == PT_OK && made && (report->row_count == 0 || report->rows[report->row_count - 1].spp != done))
-        result = pti_report_row(report, film, d, now);
+    if (result == PT_ERROR_MEMORY) report->stopped_by = "memory";
+    if (result == PT_ERROR_CANCELLED) report->stopped_by = p->cancel == 2 ? "time, inside a path" : "cancelled";
+    if (result == PT_ERROR_CANCELLED && p->cancel == 2) result = PT_OK; /* a budget is no failure */
+    if (report->spp > first && result != PT_ERROR_MEMORY && pti_report_pass(p, report, film, 1) != PT_OK) result = PT_ERROR_MEMORY;
     return result;
 }
 
 /* Starts a report anew: its rows are kept as room. */
-static void pti_report_start(pt_report *r, const pt_render_desc *d, const pt_method *method, const pt_scene *scene, const char *body)
+static void pti_report_start(pt_report *r, const pt_render_desc *d)
 {
     pt_report old = *r;
     memset(r, 0, sizeof *r);
@@ -5866,35 +5969,35 @@ static void pti_report_start(pt_report *r, const pt_render_desc *d, const pt_met
     r->row_capacity = old.row_capacity;
     r->width = d->width;
     r->height = d->height;
-    r->threads = d->parallel ? 0 : d->threads;
+    r->threads = d->parallel ? 0 : PTI_HAS_THREADS ? d->threads : 1;
     r->wall_resolution = pt_wall_resolution();
-    r->method = method->name;
     r->sampler = pt_sampler_name(d->sampler);
-    r->body = body;
-    r->needs = scene->needs;
 }
 
-static pt_result pti_render_with(pti_pass *p, pt_film *film, pt_film *copy, pt_report *report)
+/* pt_render after its arguments were found in order. */
+static pt_result pti_render(pti_pass *p, pt_film *film, pt_report *report)
 {
     const pt_render_desc *d = p->desc;
-    pt_report now = *report;
-    pt_result result = pt_film_make(copy, d->width, d->height, d->aov);
-    uint64_t nonfinite = film->nonfinite;
+    const pt_method *method = pt_method_find(d->method);
+    pt_film copy = PT_FILM_INIT;
+    pt_result result;
+    if (d->sampler == PT_SAMPLER_STRATIFIED) p->planned = d->single_net ? d->first_sample + d->spp : (d->first_sample + d->spp + 1) / 2;
+    p->li = pti_pick_instance(method, p->scene, d, &report->body);
+    p->options = d->li;
+    p->options.poll = pti_poll;
+    p->options.poll_user = p;
+    p->film = &copy;
+    p->relmse = -1;
     p->columns = (d->width + d->tile - 1) / d->tile;
     p->tiles = p->columns * ((d->height + d->tile - 1) / d->tile);
-    p->tile = d->tile;
-    p->rays = (uint64_t *)pti_alloc_zero((size_t)p->tiles, sizeof *p->rays, film->alloc_user);
-    p->nonfinite = (uint64_t *)pti_alloc_zero((size_t)p->tiles, sizeof *p->nonfinite, film->alloc_user);
-    if (!p->rays || !p->nonfinite) result = PT_ERROR_MEMORY;
-    if (result == PT_OK) result = pti_run_passes(p, film, report, &now);
-    report->spp = pt_film_spp(film);
-    report->cpu_seconds = now.cpu_seconds;
-    report->wall_seconds = now.wall_seconds;
-    report->rays = now.rays;
-    report->nonfinite = film->nonfinite - nonfinite;
-    report->stopped_by = now.stopped_by ? now.stopped_by : "memory";
-    pti_free(p->rays, film->alloc_user);
-    pti_free(p->nonfinite, film->alloc_user);
+    report->method = method->name;
+    report->needs = p->scene->needs;
+    result = pti_prepare_film(film, d, pti_fingerprint(p->scene, d, method, report->body, p->planned));
+    if (result == PT_ERROR_MISMATCH) report->error = "the film holds another picture, or other samples";
+    copy.alloc_user = film->alloc_user;
+    if (result == PT_OK) result = pt_film_make(&copy, d->width, d->height, d->aov);
+    if (result == PT_OK) result = pti_run_passes(p, film, report);
+    pt_film_free(&copy);
     return result;
 }
 
@@ -5902,40 +6005,23 @@ PTDEF pt_result pt_render(const pt_scene *scene, const pt_render_desc *desc, pt_
 {
     pt_render_desc d = *desc;
     pt_report own = PT_REPORT_INIT;
-    pt_film copy = PT_FILM_INIT;
-    const pt_method *method = NULL;
-    const char *body;
+    pt_result result = PT_ERROR_ARGUMENT;
     pti_pass p;
-    pt_result result = pti_check_desc(scene, &d, &method);
-    if (result != PT_OK) return result;
     memset(&p, 0, sizeof p);
-    p.start = p.last_call = pt_wall_seconds();
-    p.cpu_start = pt_cpu_seconds();
-    p.planned = d.sampler == PT_SAMPLER_STRATIFIED ? (d.single_net ? d.first_sample + d.spp : (d.first_sample + d.spp + 1) / 2) : 0;
-    result = pti_prepare_film(film, &d, pti_fingerprint(scene, &d, method, p.planned));
-    if (result != PT_OK) return result;
-    if (!report) {
-        own.alloc_user = film->alloc_user;
-        report = &own;
-    }
+    own.alloc_user = film->alloc_user;
+    if (!report) report = &own;
+    pti_fill_defaults(&d);
+    pti_report_start(report, &d);
     p.scene = scene;
     p.desc = &d;
-    p.li = pti_pick_instance(method, scene, &d, &body);
-    p.options = d.li;
-    p.relmse = -1;
-    p.options.poll = pti_poll;
-    p.options.poll_user = &p;
-    p.film = &copy;
-    copy.alloc_user = film->alloc_user;
-#if PTI_HAS_THREADS
-    if (!pti_mutex_make(&p.lock)) return PT_ERROR_MEMORY;
-#endif
-    pti_report_start(report, &d, method, scene, body);
-    result = pti_render_with(&p, film, &copy, report);
-#if PTI_HAS_THREADS
-    pti_mutex_free(&p.lock);
-#endif
-    pt_film_free(&copy);
+    p.start = p.last_call = pt_wall_seconds();
+    p.cpu_start = pt_cpu_seconds();
+    report->error = pti_check_desc(&d);
+    if (!scene->committed) {
+        result = scene->error != PT_OK ? scene->error : PT_ERROR_NOT_COMMITTED;
+        report->error = scene->error != PT_OK ? scene->error_text : pt_result_string(result);
+    }
+    if (!report->error) result = pti_render(&p, film, report);
     pt_report_free(&own);
     return result;
 }
@@ -6252,7 +6338,7 @@ PTDEF pt_spectrum pt_cornell_spectrum(const char *name)
     int k;
     s.nm = lamp_nm;
     s.value = lamp;
-    s.count = 4;
+    s.count = strcmp(name, "lamp") == 0 ? 4 : 0;
     s.zero_outside = 1;
     for (k = 0; k < 3; k++)
         if (strcmp(name, names[k]) == 0) {
