@@ -318,23 +318,8 @@ typedef struct pt_frame {
 
 #define PT_PI 3.14159265358979323846
 
-static inline pt_vec2 pt_v2(pt_real x, pt_real y)
-{
-    pt_vec2 v;
-    v.x = x;
-    v.y = y;
-    return v;
-}
-
-static inline pt_vec3 pt_v3(pt_real x, pt_real y, pt_real z)
-{
-    pt_vec3 v;
-    v.x = x;
-    v.y = y;
-    v.z = z;
-    return v;
-}
-
+static inline pt_vec2 pt_v2(pt_real x, pt_real y) { pt_vec2 v = {x, y}; return v; }
+static inline pt_vec3 pt_v3(pt_real x, pt_real y, pt_real z) { pt_vec3 v = {x, y, z}; return v; }
 static inline pt_vec3 pt_v3_add(pt_vec3 a, pt_vec3 b) { return pt_v3(a.x + b.x, a.y + b.y, a.z + b.z); }
 static inline pt_vec3 pt_v3_sub(pt_vec3 a, pt_vec3 b) { return pt_v3(a.x - b.x, a.y - b.y, a.z - b.z); }
 static inline pt_vec3 pt_v3_scale(pt_vec3 a, pt_real k) { return pt_v3(a.x * k, a.y * k, a.z * k); }
@@ -366,14 +351,8 @@ static inline pt_vec3 pt_frame_to_local(const pt_frame *f, pt_vec3 v)
     return pt_v3(pt_v3_dot(f->s, v), pt_v3_dot(f->t, v), pt_v3_dot(f->n, v));
 }
 
-static inline pt_rgb pt_rgb3(pt_real r, pt_real g, pt_real b)
-{
-    pt_rgb c;
-    c.r = r;
-    c.g = g;
-    c.b = b;
-    return c;
-}
+static inline pt_rgb pt_rgb3(pt_real r, pt_real g, pt_real b) { pt_rgb c = {r, g, b}; return c; }
+static inline pt_rgbd pt_rgbd3(double r, double g, double b) { pt_rgbd c = {r, g, b}; return c; }
 static inline pt_rgb pt_rgb_grey(pt_real v) { return pt_rgb3(v, v, v); }
 static inline pt_rgb pt_rgb_add(pt_rgb a, pt_rgb b) { return pt_rgb3(a.r + b.r, a.g + b.g, a.b + b.b); }
 static inline pt_rgb pt_rgb_mul(pt_rgb a, pt_rgb b) { return pt_rgb3(a.r * b.r, a.g * b.g, a.b * b.b); }
@@ -382,14 +361,6 @@ static inline pt_real pt_rgb_max(pt_rgb a)
 {
     pt_real m = a.r > a.g ? a.r : a.g;
     return m > a.b ? m : a.b;
-}
-static inline pt_rgbd pt_rgbd3(double r, double g, double b)
-{
-    pt_rgbd c;
-    c.r = r;
-    c.g = g;
-    c.b = b;
-    return c;
 }
 
 /* Luminance Y of linear sRGB (IEC 61966-2-1 primaries, D65 white): the middle row of the RGB to XYZ matrix;
@@ -1665,14 +1636,7 @@ typedef struct pti_d3 {
     double x, y, z;
 } pti_d3;
 
-PTI_INLINE pti_d3 pti_d(double x, double y, double z)
-{
-    pti_d3 v;
-    v.x = x;
-    v.y = y;
-    v.z = z;
-    return v;
-}
+PTI_INLINE pti_d3 pti_d(double x, double y, double z) { pti_d3 v = {x, y, z}; return v; }
 PTI_INLINE pti_d3 pti_d_from(pt_vec3 a) { return pti_d((double)a.x, (double)a.y, (double)a.z); }
 PTI_INLINE pt_vec3 pti_d_to(pti_d3 a) { return pt_v3((pt_real)a.x, (pt_real)a.y, (pt_real)a.z); }
 PTI_INLINE pti_d3 pti_d_add(pti_d3 a, pti_d3 b) { return pti_d(a.x + b.x, a.y + b.y, a.z + b.z); }
@@ -2793,12 +2757,8 @@ PTI_INLINE double pti_edge(double a, double b, double c, double d)
 /* A corner relative to the origin, sheared: (x, y) across the ray, z along it in units of d. */
 PTI_INLINE pti_d3 pti_shear(const pti_ray *r, pt_vec3 v)
 {
-    double c[3], px, py;
-    c[0] = (double)v.x - r->o[0];
-    c[1] = (double)v.y - r->o[1];
-    c[2] = (double)v.z - r->o[2];
-    px = r->sx * c[r->kz];
-    py = r->sy * c[r->kz];
+    const double c[3] = {(double)v.x - r->o[0], (double)v.y - r->o[1], (double)v.z - r->o[2]};
+    double px = r->sx * c[r->kz], py = r->sy * c[r->kz];
     PTI_FENCE(px);
     PTI_FENCE(py);
     return pti_d(c[r->kx] - px, c[r->ky] - py, r->sz * c[r->kz]);
@@ -3161,10 +3121,8 @@ static pti_bounds pti_bounds_empty(void)
 
 static void pti_bounds_add(pti_bounds *b, pt_vec3 lo, pt_vec3 hi)
 {
-    double l[3], h[3];
+    const double l[3] = {(double)lo.x, (double)lo.y, (double)lo.z}, h[3] = {(double)hi.x, (double)hi.y, (double)hi.z};
     int k;
-    l[0] = (double)lo.x; l[1] = (double)lo.y; l[2] = (double)lo.z;
-    h[0] = (double)hi.x; h[1] = (double)hi.y; h[2] = (double)hi.z;
     for (k = 0; k < 3; k++) {
         if (l[k] < b->lo[k]) b->lo[k] = l[k];
         if (h[k] > b->hi[k]) b->hi[k] = h[k];
@@ -4048,9 +4006,8 @@ static int pti_scene_no_memory(pt_scene *scene, const char *item, uint32_t numbe
 /* The value that is out of range in v, or 0 and *bad = 0. */
 static int pti_coordinate_bad(pt_vec3 v, double *bad)
 {
-    double c[3];
+    const double c[3] = {(double)v.x, (double)v.y, (double)v.z};
     int k;
-    c[0] = (double)v.x; c[1] = (double)v.y; c[2] = (double)v.z;
     for (k = 0; k < 3; k++)
         if (!(fabs(c[k]) <= PT_MAX_COORDINATE)) {
             *bad = c[k];
@@ -4081,9 +4038,8 @@ static int pti_check_material_id(pt_scene *scene, const char *item, uint32_t num
 /* Each band in [0, max]. */
 static int pti_check_rgb(pt_scene *scene, const char *item, uint32_t number, const char *name, pt_rgb c, double max)
 {
-    double v[3];
+    const double v[3] = {(double)c.r, (double)c.g, (double)c.b};
     int k;
-    v[0] = (double)c.r; v[1] = (double)c.g; v[2] = (double)c.b;
     for (k = 0; k < 3; k++)
         if (!(v[k] >= 0 && v[k] <= max) || !pti_finite(v[k])) {
             pti_scene_fail_value(scene, item, number, name, v[k], max > 1 ? "is negative or not finite" : "is outside [0,1]");
@@ -4176,30 +4132,24 @@ PTDEF int pt_add_mesh(pt_scene *scene, const pt_vec3 *positions, const pt_vec3 *
 PTDEF int pt_add_triangle(pt_scene *scene, pt_vec3 v0, pt_vec3 v1, pt_vec3 v2, int material)
 {
     static const uint32_t indices[3] = {0, 1, 2};
-    pt_vec3 v[3];
+    const pt_vec3 v[3] = {v0, v1, v2};
     int id = (int)scene->triangle_count;
-    v[0] = v0; v[1] = v1; v[2] = v2;
     return pti_add_mesh(scene, "triangle", (uint32_t)id, v, NULL, NULL, 3, indices, 1, material) < 0 ? -1 : id;
 }
 
 PTDEF int pt_add_quad(pt_scene *scene, pt_vec3 v0, pt_vec3 v1, pt_vec3 v2, pt_vec3 v3, int material)
 {
     static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
-    pt_vec3 v[4];
+    const pt_vec3 v[4] = {v0, v1, v2, v3};
     int id = (int)scene->triangle_count;
-    v[0] = v0; v[1] = v1; v[2] = v2; v[3] = v3;
     return pti_add_mesh(scene, "quad of triangle", (uint32_t)id, v, NULL, NULL, 4, indices, 2, material) < 0 ? -1 : id;
 }
 
 PTDEF int pt_add_parallelogram(pt_scene *scene, pt_vec3 corner, pt_vec3 edge1, pt_vec3 edge2, int material)
 {
     uint32_t n = scene->parallelogram_count;
-    pt_parallelogram p;
-    pt_vec3 v[3];
-    v[0] = p.corner = corner;
-    v[1] = p.edge1 = edge1;
-    v[2] = p.edge2 = edge2;
-    p.material = material;
+    const pt_parallelogram p = {corner, edge1, edge2, material};
+    const pt_vec3 v[3] = {corner, edge1, edge2};
     if (!pti_check_coordinates(scene, "parallelogram", n, v, 3)) return -1;
     if (!pti_check_material_id(scene, "parallelogram", n, material)) return -1;
     return PTI_PUSH(scene, "parallelogram", parallelograms, parallelogram_count, parallelogram_capacity, p);
@@ -4208,10 +4158,7 @@ PTDEF int pt_add_parallelogram(pt_scene *scene, pt_vec3 corner, pt_vec3 edge1, p
 PTDEF int pt_add_sphere(pt_scene *scene, pt_vec3 centre, pt_real radius, int material)
 {
     uint32_t n = scene->sphere_count;
-    pt_sphere s;
-    s.centre = centre;
-    s.radius = radius;
-    s.material = material;
+    const pt_sphere s = {centre, radius, material};
     if (!pti_check_coordinates(scene, "sphere", n, &centre, 1)) return -1;
     if (!(radius > 0 && (double)radius <= PT_MAX_COORDINATE))
         return pti_scene_fail_value(scene, "sphere", n, "radius", (double)radius, "is not in (0, 1e18]");
@@ -4222,9 +4169,7 @@ PTDEF int pt_add_sphere(pt_scene *scene, pt_vec3 centre, pt_real radius, int mat
 PTDEF int pt_add_point_light(pt_scene *scene, pt_vec3 position, pt_rgb intensity)
 {
     uint32_t n = scene->point_light_count;
-    pt_point_light l;
-    l.position = position;
-    l.intensity = intensity;
+    const pt_point_light l = {position, intensity};
     if (!pti_check_coordinates(scene, "point light", n, &position, 1)) return -1;
     if (!pti_check_rgb(scene, "point light", n, "intensity", intensity, HUGE_VAL)) return -1;
     return PTI_PUSH(scene, "point light", point_lights, point_light_count, point_light_capacity, l);
@@ -4786,68 +4731,45 @@ PTDEF void pt_splat_list_free(pt_splat_list *list)
     list->alloc_user = user;
 }
 
-/* Sums of squared errors as they are collected over pixels and bands. */
-typedef struct pti_error_sums {
-    double square, relative, relative_001, n;
-} pti_error_sums;
-
-static void pti_error_add(pti_error_sums *s, double square, double reference, double floor2)
+/* Value k of the reference, or of the film itself. */
+static double pti_reference_value(const pt_film *film, const float *reference, size_t k)
 {
-    double r2 = reference * reference;
-    s->square += square;
-    if (square > 0) s->relative += square / (r2 + floor2);
-    s->relative_001 += square / (r2 + 0.01);
-    s->n += 1;
+    return reference ? (double)reference[k] : pti_film_value(film, 2, k);
 }
 
-static void pti_error_finish(const pti_error_sums *s, pt_error *out)
+/* The error against a reference, or without one the estimate from the halves with R = I. */
+static void pti_film_error(const pt_film *film, const float *reference, pt_error *out)
 {
-    out->rmse = sqrt(s->square / s->n);
-    out->relmse = s->relative / s->n;
-    out->relmse_001 = s->relative_001 / s->n;
-}
-
-/* (0.1 * mean luminance)^2 of the film itself. */
-static double pti_film_floor(const pt_film *film)
-{
-    size_t n = (size_t)film->width * (size_t)film->height, i;
-    double sum = 0;
-    for (i = 0; i < n; i++)
-        sum += pt_luminance(pti_film_value(film, 2, 3 * i), pti_film_value(film, 2, 3 * i + 1), pti_film_value(film, 2, 3 * i + 2));
-    return 0.01 * (sum / (double)n) * (sum / (double)n);
+    size_t n = (size_t)film->width * (size_t)film->height, k;
+    double a = film->samples[0], b = film->samples[1], share = a * b / ((a + b) * (a + b));
+    double mean = 0, square = 0, relative = 0, relative_001 = 0;
+    for (k = 0; k < 3 * n; k += 3)
+        mean += pt_luminance(pti_reference_value(film, reference, k), pti_reference_value(film, reference, k + 1),
+                             pti_reference_value(film, reference, k + 2)) / (double)n;
+    for (k = 0; k < 3 * n; k++) {
+        double r = pti_reference_value(film, reference, k), d, e;
+        d = reference ? pti_film_value(film, 2, k) - r : pti_film_value(film, 0, k) - pti_film_value(film, 1, k);
+        e = reference ? d * d : share * d * d;
+        square += e;
+        if (e > 0) relative += e / (r * r + 0.01 * mean * mean); /* a black picture without error: 0, not 0/0 */
+        relative_001 += e / (r * r + 0.01);
+    }
+    out->rmse = sqrt(square / (3.0 * (double)n));
+    out->relmse = relative / (3.0 * (double)n);
+    out->relmse_001 = relative_001 / (3.0 * (double)n);
 }
 
 PTDEF int pt_film_error_estimate(const pt_film *film, pt_error *out)
 {
-    size_t n = 3 * (size_t)film->width * (size_t)film->height, k;
-    double a = film->samples[0], b = film->samples[1], share, floor2;
-    pti_error_sums sums;
-    memset(&sums, 0, sizeof sums);
     memset(out, 0, sizeof *out);
-    if (!(a > 0 && b > 0)) return 0;
-    share = a * b / ((a + b) * (a + b));
-    floor2 = pti_film_floor(film);
-    for (k = 0; k < n; k++) {
-        double d = pti_film_value(film, 0, k) - pti_film_value(film, 1, k);
-        pti_error_add(&sums, share * d * d, pti_film_value(film, 2, k), floor2);
-    }
-    pti_error_finish(&sums, out);
+    if (film->samples[0] == 0 || film->samples[1] == 0) return 0;
+    pti_film_error(film, NULL, out);
     return 1;
 }
 
 PTDEF void pt_film_error(const pt_film *film, const float *reference, pt_error *out)
 {
-    size_t n = (size_t)film->width * (size_t)film->height, k;
-    double mean = 0;
-    pti_error_sums sums;
-    memset(&sums, 0, sizeof sums);
-    for (k = 0; k < n; k++)
-        mean += pt_luminance((double)reference[3 * k], (double)reference[3 * k + 1], (double)reference[3 * k + 2]) / (double)n;
-    for (k = 0; k < 3 * n; k++) {
-        double r = (double)reference[k], d = pti_film_value(film, 2, k) - r;
-        pti_error_add(&sums, d * d, r, 0.01 * mean * mean);
-    }
-    pti_error_finish(&sums, out);
+    pti_film_error(film, reference, out);
 }
 
 /* =====================================================================================================
@@ -5753,12 +5675,7 @@ static void pti_render_tile(void *context, int index)
 /* The sums of a film, in the order of `layer`; NULL where a layer is not there. */
 static double **pti_film_layer(pt_film *film, int layer, size_t *channels)
 {
-    double **layers[5];
-    layers[0] = &film->half[0];
-    layers[1] = &film->half[1];
-    layers[2] = &film->albedo;
-    layers[3] = &film->normal;
-    layers[4] = &film->depth;
+    double **layers[5] = {&film->half[0], &film->half[1], &film->albedo, &film->normal, &film->depth};
     *channels = layer == 4 ? 1 : 3;
     return layers[layer];
 }
