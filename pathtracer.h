@@ -2816,12 +2816,9 @@ PTI_INLINE void pti_parallelogram_corners(const pt_parallelogram *s, pt_vec3 v[4
 
 /* A parallelogram is two triangles that share the diagonal from the corner; u and v are the weights of its
    edges, u >= v in the first triangle. */
-PTI_INLINE int pti_parallelogram(const pti_ray *r, const pt_parallelogram *s, double tmax, double *t, double *u,
-                                 double *v)
+PTI_INLINE int pti_parallelogram(const pti_ray *r, const pt_vec3 c[4], double tmax, double *t, double *u, double *v)
 {
-    pt_vec3 c[4];
     double b1, b2;
-    pti_parallelogram_corners(s, c);
     if (pti_triangle(r, c[0], c[1], c[2], tmax, t, &b1, &b2)) {
         *u = b1 + b2;
         *v = b2;
@@ -2968,6 +2965,21 @@ PTDEF pt_ray pt_spawn_ray_to(pt_vec3 p, pt_vec3 p_error, pt_vec3 np, pt_vec3 q, 
     return ray;
 }
 
+/* The corners of a flat primitive, and how many: a triangle has v[3] = v[2]. */
+PTI_INLINE int pti_corners(const pt_scene *scene, const pt_primitive *p, pt_vec3 v[4])
+{
+    const pt_triangle *s;
+    if (p->shape == PT_SHAPE_PARALLELOGRAM) {
+        pti_parallelogram_corners(&scene->parallelograms[p->index], v);
+        return 4;
+    }
+    s = &scene->triangles[p->index];
+    v[0] = scene->positions[s->v[0]];
+    v[1] = scene->positions[s->v[1]];
+    v[2] = v[3] = scene->positions[s->v[2]];
+    return 3;
+}
+
 /* The nearest hit so far. */
 typedef struct pti_best {
     double t, u, v;
@@ -2980,16 +2992,15 @@ PTI_INLINE int pti_test(const pt_scene *scene, const pti_ray *r, int i, pti_best
 {
     const pt_primitive *p = &scene->primitives[i];
     double t, u = 0, v = 0, tmax = best->primitive > i ? best->t * (1 + 2 * PTI_2_M53) : best->t;
+    pt_vec3 c[4];
     int hit;
-    if (p->shape == PT_SHAPE_TRIANGLE) {
-        const pt_triangle *s = &scene->triangles[p->index];
-        hit = pti_triangle(r, scene->positions[s->v[0]], scene->positions[s->v[1]], scene->positions[s->v[2]], tmax,
-                           &t, &u, &v);
-    } else if (p->shape == PT_SHAPE_PARALLELOGRAM) {
-        hit = pti_parallelogram(r, &scene->parallelograms[p->index], tmax, &t, &u, &v);
-    } else {
+    if (p->shape == PT_SHAPE_SPHERE) {
         const pt_sphere *s = &scene->spheres[p->index];
         hit = pti_sphere(r, s->centre, (double)s->radius, tmax, &t);
+    } else if (pti_corners(scene, p, c) == 3) {
+        hit = pti_triangle(r, c[0], c[1], c[2], tmax, &t, &u, &v);
+    } else {
+        hit = pti_parallelogram(r, c, tmax, &t, &u, &v);
     }
     if (!hit || t > best->t) return 0;
     best->t = t;
@@ -3019,7 +3030,7 @@ static pti_d3 pti_d_abs(pti_d3 a)
 }
 
 /* Position, error bound and normal of a triangle at weights b1, b2 of its corners 1 and 2. */
-static void pti_fill_corners(pt_hit *hit, pt_vec3 v0, pt_vec3 v1, pt_vec3 v2, double b1, double b2)
+static void pti_fill_triangle(pt_hit *hit, pt_vec3 v0, pt_vec3 v1, pt_vec3 v2, double b1, double b2)
 {
     pti_d3 a = pti_d_from(v0), b = pti_d_from(v1), c = pti_d_from(v2), p;
     p = pti_d_add(pti_d_scale(a, 1 - b1 - b2), pti_d_add(pti_d_scale(b, b1), pti_d_scale(c, b2)));
@@ -3028,13 +3039,13 @@ static void pti_fill_corners(pt_hit *hit, pt_vec3 v0, pt_vec3 v1, pt_vec3 v2, do
     hit->ns = hit->ng;
 }
 
-/* The same on the triangle of a parallelogram in which the weights u, v of its edges lie. */
-static void pti_fill_parallelogram(pt_hit *hit, const pt_parallelogram *s, double u, double v)
+/* The same for any flat primitive at its hit's u and v. */
+static void pti_fill_flat(const pt_scene *scene, const pt_primitive *p, double u, double v, pt_hit *hit)
 {
     pt_vec3 c[4];
-    pti_parallelogram_corners(s, c);
-    if (u >= v) pti_fill_corners(hit, c[0], c[1], c[2], u - v, v);
-    else pti_fill_corners(hit, c[0], c[2], c[3], u, v - u);
+    if (pti_corners(scene, p, c) == 3) pti_fill_triangle(hit, c[0], c[1], c[2], u, v);
+    else if (u >= v) pti_fill_triangle(hit, c[0], c[1], c[2], u - v, v);
+    else pti_fill_triangle(hit, c[0], c[2], c[3], u, v - u);
 }
 
 /* Shading normal and texture coordinates, where the mesh has them. */
@@ -3057,14 +3068,22 @@ static void pti_fill_mesh(const pt_scene *scene, const pt_triangle *s, pt_hit *h
     }
 }
 
-static void pti_fill_sphere(const pt_sphere *s, const pti_ray *r, double t, pt_hit *hit)
+/* The point of a sphere in the (not normalised) direction n from its centre: projected back onto the sphere, so
+   that the error of a distance along a ray does not matter. */
+static void pti_fill_sphere(const pt_sphere *s, pti_d3 n, pt_hit *hit)
 {
-    pti_d3 c = pti_d_from(s->centre), n, radius = pti_d((double)s->radius, (double)s->radius, (double)s->radius);
-    n = pti_d(r->o[0] + t * r->d[0], r->o[1] + t * r->d[1], r->o[2] + t * r->d[2]);
-    n = pti_d_normalize(pti_d_sub(n, c));
-    /* Projected back onto the sphere, so that the error of t does not matter. */
-    pti_set_point(hit, pti_d_add(c, pti_d_scale(n, (double)s->radius)), pti_d_add(pti_d_abs(c), radius));
+    pti_d3 c = pti_d_from(s->centre);
+    double r = (double)s->radius;
+    n = pti_d_normalize(n);
+    pti_set_point(hit, pti_d_add(c, pti_d_scale(n, r)), pti_d_add(pti_d_abs(c), pti_d(r, r, r)));
     hit->ng = hit->ns = pti_d_to(n);
+}
+
+static int pti_primitive_material(const pt_scene *scene, const pt_primitive *p)
+{
+    return p->shape == PT_SHAPE_TRIANGLE        ? scene->triangles[p->index].material
+           : p->shape == PT_SHAPE_PARALLELOGRAM ? scene->parallelograms[p->index].material
+                                                : scene->spheres[p->index].material;
 }
 
 /* Everything about the hit. */
@@ -3078,20 +3097,16 @@ static void pti_fill(const pt_scene *scene, const pti_ray *r, const pti_best *be
     hit->primitive = best->primitive;
     hit->shape = p->shape;
     hit->light = p->light;
-    if (p->shape == PT_SHAPE_TRIANGLE) {
-        const pt_triangle *s = &scene->triangles[p->index];
-        hit->material = s->material;
-        pti_fill_corners(hit, scene->positions[s->v[0]], scene->positions[s->v[1]], scene->positions[s->v[2]],
-                         best->u, best->v);
-        pti_fill_mesh(scene, s, hit);
-    } else if (p->shape == PT_SHAPE_PARALLELOGRAM) {
-        const pt_parallelogram *s = &scene->parallelograms[p->index];
-        hit->material = s->material;
-        pti_fill_parallelogram(hit, s, best->u, best->v);
-    } else {
-        hit->material = scene->spheres[p->index].material;
-        pti_fill_sphere(&scene->spheres[p->index], r, best->t, hit);
+    hit->material = pti_primitive_material(scene, p);
+    if (p->shape == PT_SHAPE_SPHERE) {
+        const pt_sphere *s = &scene->spheres[p->index];
+        const double t = best->t;
+        pti_d3 q = pti_d(r->o[0] + t * r->d[0], r->o[1] + t * r->d[1], r->o[2] + t * r->d[2]);
+        pti_fill_sphere(s, pti_d_sub(q, pti_d_from(s->centre)), hit);
+        return;
     }
+    pti_fill_flat(scene, p, best->u, best->v, hit);
+    if (p->shape == PT_SHAPE_TRIANGLE) pti_fill_mesh(scene, &scene->triangles[p->index], hit);
 }
 
 /* =====================================================================================================
@@ -3620,27 +3635,19 @@ typedef struct pti_flat {
 static int pti_flat_make(pti_flat *f, const pt_scene *scene, const pt_primitive *primitive, pt_vec3 p)
 {
     pt_vec3 v[4];
-    if (primitive->shape == PT_SHAPE_TRIANGLE) {
-        const pt_triangle *s = &scene->triangles[primitive->index];
-        v[0] = scene->positions[s->v[0]];
-        v[1] = scene->positions[s->v[1]];
-        v[2] = v[3] = scene->positions[s->v[2]];
-    } else {
-        pti_parallelogram_corners(&scene->parallelograms[primitive->index], v);
-    }
+    int corners = pti_corners(scene, primitive, v);
     f->warp = pti_d_add(pti_d_abs(pti_d_from(v[1])), pti_d_add(pti_d_abs(pti_d_from(v[2])), pti_d_abs(pti_d_from(v[3]))));
-    f->warp = pti_d_scale(f->warp, primitive->shape == PT_SHAPE_PARALLELOGRAM ? PTI_UNIT_ROUNDOFF : 0);
+    f->warp = pti_d_scale(f->warp, corners == 4 ? PTI_UNIT_ROUNDOFF : 0);
     f->corner = pti_d_between(p, v[0]);
     f->n = pti_d_cross(pti_d_between(v[0], v[1]), pti_d_between(v[0], v[2]));
     if (!(pti_d_dot(f->corner, f->n) < 0)) return 0;
-    f->is_rectangle = primitive->shape == PT_SHAPE_PARALLELOGRAM && pti_is_rectangle(v);
+    f->is_rectangle = corners == 4 && pti_is_rectangle(v);
     if (f->is_rectangle) {
         f->solid_angle = pti_spherical_rectangle_setup(&f->rectangle, f->corner, pti_d_between(v[0], v[1]), pti_d_between(v[0], v[3]));
     } else {
         f->solid_angle = pt_spherical_triangle_make(&f->half[0], p, v[0], v[1], v[2]);
         f->half[1].solid_angle = 0;
-        if (primitive->shape == PT_SHAPE_PARALLELOGRAM)
-            f->solid_angle += pt_spherical_triangle_make(&f->half[1], p, v[0], v[2], v[3]);
+        if (corners == 4) f->solid_angle += pt_spherical_triangle_make(&f->half[1], p, v[0], v[2], v[3]);
     }
     return f->solid_angle > 0;
 }
@@ -3686,10 +3693,11 @@ static double pti_sphere_omc(double r, double d)
 
 static int pti_sample_sphere_light(const pt_sphere *s, pt_vec3 p, pt_vec2 u, pt_light_sample_result *out)
 {
-    pti_d3 o = pti_d_from(p), c = pti_d_from(s->centre), axis = pti_d_sub(c, o), w, n;
-    double r = (double)s->radius, d = pti_d_length(axis), t, x, m, sin2;
+    pti_d3 axis = pti_d_between(p, s->centre), w;
+    double r = (double)s->radius, d = pti_d_length(axis), t, x, sin2;
     pt_frame frame;
     pt_vec3 l;
+    pt_hit hit;
     if (d > r) {
         double omc = pti_sphere_omc(r, d), phi = 2 * PT_PI * (double)u.y;
         frame = pt_frame_from_normal(pti_d_to(pti_d_normalize(axis)));
@@ -3705,11 +3713,10 @@ static int pti_sample_sphere_light(const pt_sphere *s, pt_vec3 p, pt_vec2 u, pt_
         t = x + sqrt(fmax(0, (r - d) * (r + d) + x * x)); /* the far side */
         out->pdf_w = (double)pt_warp_sphere_pdf_w();
     }
-    n = pti_d_normalize(pti_d_sub(pti_d_scale(w, t), axis));
-    m = fabs(c.x) + fabs(c.y) + fabs(c.z) + r + d;
-    out->p = pti_d_to(pti_d_add(c, pti_d_scale(n, r)));
-    out->p_error = pt_v3(pti_point_error(out->p.x, m), pti_point_error(out->p.y, m), pti_point_error(out->p.z, m));
-    out->n = pti_d_to(n);
+    pti_fill_sphere(s, pti_d_sub(pti_d_scale(w, t), axis), &hit);
+    out->p = hit.p;
+    out->p_error = hit.p_error;
+    out->n = hit.ng;
     out->wi = pti_d_to(pti_d_normalize(w));
     out->distance = (pt_real)t;
     return t > 0;
@@ -3795,21 +3802,10 @@ static double pti_scene_radius(const pt_scene *scene)
 /* A uniform point of an area light with its normal. */
 static void pti_light_point(const pt_scene *scene, const pt_primitive *primitive, pt_vec2 u, pt_hit *hit)
 {
-    if (primitive->shape == PT_SHAPE_SPHERE) {
-        const pt_sphere *s = &scene->spheres[primitive->index];
-        pt_vec3 n = pt_warp_sphere(u);
-        double r = (double)s->radius;
-        hit->ng = n;
-        pti_set_point(hit, pti_d_add(pti_d_from(s->centre), pti_d_scale(pti_d_normalize(pti_d_from(n)), r)),
-                      pti_d_add(pti_d_abs(pti_d_from(s->centre)), pti_d(r, r, r)));
-    } else if (primitive->shape == PT_SHAPE_TRIANGLE) {
-        const pt_triangle *s = &scene->triangles[primitive->index];
-        pt_vec2 b = pt_warp_triangle(u);
-        pti_fill_corners(hit, scene->positions[s->v[0]], scene->positions[s->v[1]], scene->positions[s->v[2]],
-                         (double)b.x, (double)b.y);
-    } else {
-        pti_fill_parallelogram(hit, &scene->parallelograms[primitive->index], (double)u.x, (double)u.y);
-    }
+    if (primitive->shape == PT_SHAPE_TRIANGLE) u = pt_warp_triangle(u);
+    if (primitive->shape == PT_SHAPE_SPHERE)
+        pti_fill_sphere(&scene->spheres[primitive->index], pti_d_from(pt_warp_sphere(u)), hit);
+    else pti_fill_flat(scene, primitive, (double)u.x, (double)u.y, hit);
 }
 
 static void pti_le_area(const pt_scene *scene, const pt_light *l, pt_vec2 u_p, pt_vec2 u_w, pt_real u_side,
@@ -4190,7 +4186,7 @@ static void pti_primitive_box(const pt_scene *scene, const pt_primitive *p, pt_v
 {
     pti_bounds b = pti_bounds_empty();
     pt_vec3 v[4];
-    int k, corners = 4;
+    int k, corners;
     if (p->shape == PT_SHAPE_SPHERE) {
         const pt_sphere *s = &scene->spheres[p->index];
         pt_vec3 c = s->centre;
@@ -4200,32 +4196,23 @@ static void pti_primitive_box(const pt_scene *scene, const pt_primitive *p, pt_v
         *area = 4 * PT_PI * (double)r * (double)r;
         return;
     }
-    if (p->shape == PT_SHAPE_TRIANGLE) {
-        const pt_triangle *s = &scene->triangles[p->index];
-        for (corners = 0; corners < 3; corners++) v[corners] = scene->positions[s->v[corners]];
-    } else {
-        pti_parallelogram_corners(&scene->parallelograms[p->index], v);
-    }
+    corners = pti_corners(scene, p, v);
     for (k = 0; k < corners; k++) pti_bounds_add(&b, v[k], v[k]);
     *lo = pt_v3((pt_real)b.lo[0], (pt_real)b.lo[1], (pt_real)b.lo[2]);
     *hi = pt_v3((pt_real)b.hi[0], (pt_real)b.hi[1], (pt_real)b.hi[2]);
-    *area = pti_d_length(pti_d_cross(pti_d_between(v[0], v[1]), pti_d_between(v[0], v[corners - 1])));
+    *area = pti_d_length(pti_d_cross(pti_d_between(v[0], v[1]), pti_d_between(v[0], v[3])));
     if (corners == 3) *area /= 2;
 }
 
-static int pti_primitive_material(const pt_scene *scene, const pt_primitive *p)
-{
-    return p->shape == PT_SHAPE_TRIANGLE        ? scene->triangles[p->index].material
-           : p->shape == PT_SHAPE_PARALLELOGRAM ? scene->parallelograms[p->index].material
-                                                : scene->spheres[p->index].material;
-}
-
+/* Appends a primitive, unless it has no area (or one of a parallelogram's rounded halves has none). */
 static void pti_add_primitive(pt_scene *scene, pt_shape shape, uint32_t index)
 {
-    pt_primitive *p = &scene->primitives[scene->primitive_count++];
-    p->shape = shape;
-    p->index = index;
-    p->light = -1;
+    const pt_primitive p = {shape, index, -1};
+    pt_vec3 v[4];
+    int corners = shape == PT_SHAPE_SPHERE ? 0 : pti_corners(scene, &p, v);
+    if ((corners >= 3 && !pti_triangle_has_area(v[0], v[1], v[2])) || (corners == 4 && !pti_triangle_has_area(v[0], v[2], v[3])))
+        scene->degenerate_count++;
+    else scene->primitives[scene->primitive_count++] = p;
 }
 
 /* The list of all primitives that can be hit. */
@@ -4236,19 +4223,8 @@ static int pti_commit_primitives(pt_scene *scene)
     if (count > 0x7fffffffu) return 0;
     scene->primitives = (pt_primitive *)pti_alloc(count, sizeof *scene->primitives, scene->alloc_user);
     if (!scene->primitives) return 0;
-    for (i = 0; i < scene->triangle_count; i++) {
-        const uint32_t *v = scene->triangles[i].v;
-        const pt_vec3 *p = scene->positions;
-        if (pti_triangle_has_area(p[v[0]], p[v[1]], p[v[2]])) pti_add_primitive(scene, PT_SHAPE_TRIANGLE, i);
-        else scene->degenerate_count++;
-    }
-    for (i = 0; i < scene->parallelogram_count; i++) {
-        pt_vec3 v[4];
-        pti_parallelogram_corners(&scene->parallelograms[i], v);
-        if (pti_triangle_has_area(v[0], v[1], v[2]) && pti_triangle_has_area(v[0], v[2], v[3]))
-            pti_add_primitive(scene, PT_SHAPE_PARALLELOGRAM, i);
-        else scene->degenerate_count++;
-    }
+    for (i = 0; i < scene->triangle_count; i++) pti_add_primitive(scene, PT_SHAPE_TRIANGLE, i);
+    for (i = 0; i < scene->parallelogram_count; i++) pti_add_primitive(scene, PT_SHAPE_PARALLELOGRAM, i);
     for (i = 0; i < scene->sphere_count; i++) pti_add_primitive(scene, PT_SHAPE_SPHERE, i);
     return 1;
 }
