@@ -1,0 +1,147 @@
+# pathtracer.h - builds the renderer, the tests, the examples. `make help` lists the targets.
+#
+# Needs a C99 compiler, make and libm. CC, CFLAGS, LDFLAGS and EXTRA (more flags, such as EXTRA=-DPT_DOUBLE)
+# are respected; everything made goes to build/.
+
+.SUFFIXES:
+
+CFLAGS ?= -O2
+CXXFLAGS ?= $(CFLAGS)
+ifeq ($(origin CXX),default)
+CXX = c++
+endif
+# How many things `make test` does at a time; make's own -j wins.
+JOBS ?= 2
+
+WARN = -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wdouble-promotion
+WARN_C = $(WARN) -Wstrict-prototypes -Wmissing-prototypes
+# -ffp-contract=off: two builds, and two instances of the path integrator, give the same bits.
+FIXED = -std=c99 -ffp-contract=off
+FIXED_CXX = -std=c++11 -ffp-contract=off
+LDLIBS = -lm -pthread
+
+BUILD_C = $(CC) $(FIXED) $(WARN_C) $(CFLAGS) $(EXTRA) -I. -pthread $(LDFLAGS)
+BUILD_CXX = $(CXX) $(FIXED_CXX) $(WARN) $(CXXFLAGS) $(EXTRA) -I. -pthread $(LDFLAGS)
+
+# The picture that plain `make` renders.
+SCENE = cornell
+SIZE = 400x400
+SPP = 64
+
+SHARES = $(shell k=1; while [ $$k -le $(JOBS) ]; do echo $$k; k=$$((k + 1)); done)
+TESTS = $(patsubst tests/%.c,%,$(wildcard tests/test_*.c))
+SCRIPTS = docs sections switches
+TEST_LOGS = $(SCRIPTS:%=build/test/check_%.log) $(TESTS:%=build/test/%.log)
+EXAMPLES = minimal render own_threads two_files cpp_user
+
+.PHONY: all test test-long test-logs examples bench mutants clean help FORCE
+# A program that was built only half is no program.
+.DELETE_ON_ERROR:
+
+all: build/render
+	build/render $(SCENE) --size $(SIZE) --spp $(SPP) -o build/cornell.ppm -o build/cornell.png \
+	    --csv build/cornell.csv --svg build/cornell.svg
+
+help:
+	@echo 'make            render the Cornell box to build/cornell.ppm and .png; error against run time on stdout'
+	@echo 'make test       all checks; ends with a line "N passed, N failed"'
+	@echo 'make test-long  the same with the checks that need more samples'
+	@echo 'make examples   build and run the programs of examples/'
+	@echo 'make bench      rays per second, compile time, what leaving out saves; CSV on stdout'
+	@echo 'make mutants    break the header in known ways; every broken copy must fail a check'
+	@echo 'make clean      remove build/'
+	@echo 'variables       CC CFLAGS LDFLAGS EXTRA JOBS; SHORT=1 SEED=n for the tests; SCENE SIZE SPP for plain make'
+
+clean:
+	rm -rf build
+
+# Rewritten only when compilers or flags change, so that what was built with others is built anew.
+build/flags: FORCE
+	@mkdir -p build
+	@echo '$(BUILD_C) | $(BUILD_CXX)' | cmp -s - $@ || echo '$(BUILD_C) | $(BUILD_CXX)' > $@
+
+FORCE:
+
+build/render: examples/render.c pathtracer.h build/flags
+	$(BUILD_C) examples/render.c -o $@ $(LDLIBS)
+
+# ---- examples ------------------------------------------------------------------------------------
+
+examples: $(EXAMPLES:%=build/examples/%)
+	@cd build/examples && for e in $(EXAMPLES); do \
+	    echo "== $$e"; \
+	    case $$e in \
+	    render) set -- ./render cornell-spheres --size 64x64 --spp 16 --progress off -o render.png ;; \
+	    *) set -- ./$$e ;; \
+	    esac; \
+	    if [ -s $$e ]; then "$$@" || exit 1; else echo 'skipped: no C++ compiler'; fi; \
+	done
+
+build/examples/minimal: examples/minimal.c pathtracer.h build/flags
+	@mkdir -p build/examples
+	$(BUILD_C) examples/minimal.c -o $@ $(LDLIBS)
+
+build/examples/render: build/render
+	@mkdir -p build/examples
+	cp build/render $@
+
+build/examples/own_threads: examples/own_threads.c pathtracer.h build/flags
+	@mkdir -p build/examples
+	$(BUILD_C) examples/own_threads.c -o $@ $(LDLIBS)
+
+build/examples/two_files: examples/two_files/main.c examples/two_files/pathtracer_impl.c pathtracer.h build/flags
+	@mkdir -p build/examples
+	$(BUILD_C) examples/two_files/main.c examples/two_files/pathtracer_impl.c -o $@ $(LDLIBS)
+
+# An empty file stands for the program where there is no C++ compiler.
+build/examples/cpp_user: examples/cpp_user.cpp pathtracer.h build/flags
+	@mkdir -p build/examples
+	@if command -v $(firstword $(CXX)) > /dev/null 2>&1; then \
+	    echo '$(BUILD_CXX) examples/cpp_user.cpp -o $@ $(LDLIBS)'; \
+	    $(BUILD_CXX) examples/cpp_user.cpp -o $@ $(LDLIBS); \
+	else : > $@; fi
+
+# ---- tests ---------------------------------------------------------------------------------------
+
+# Builds and runs two at a time unless make was told how many; the counts are added up at the end.
+test:
+	@rm -f build/test/*.log
+	@$(MAKE) --no-print-directory $(if $(findstring jobserver,$(MAKEFLAGS)),,-j$(JOBS)) -k test-logs || true
+	@sh tests/run.sh sum $(TEST_LOGS)
+
+test-long:
+	@LONG=1 $(MAKE) --no-print-directory test
+
+test-logs: $(TEST_LOGS)
+
+build/test/test_%: tests/test_%.c $(wildcard tests/*.h) pathtracer.h build/flags
+	@mkdir -p build/test
+	$(BUILD_C) -Itests $< -o $@ $(LDLIBS)
+
+build/test/test_%.log: build/test/test_% FORCE
+	@sh tests/run.sh one $@ ./$<
+
+build/test/check_%.log: tests/check_%.sh pathtracer.h FORCE
+	@mkdir -p build/test
+	@CC='$(CC)' CFLAGS='$(CFLAGS)' EXTRA='$(EXTRA)' sh tests/run.sh one $@ sh $<
+
+# ---- measuring, and testing the tests ------------------------------------------------------------
+
+build/bench: tests/bench/bench.c pathtracer.h build/flags
+	$(BUILD_C) tests/bench/bench.c -o $@ $(LDLIBS)
+
+bench: build/bench
+	@CC='$(CC)' CFLAGS='$(CFLAGS)' build/bench
+
+build/mutants/run: tests/mutants.c build/flags
+	@mkdir -p build/mutants
+	$(BUILD_C) tests/mutants.c -o $@
+
+# JOBS shares of the list at a time. ONLY=name takes one mutant.
+mutants: build/mutants/run
+	@rm -f build/mutants/share*.log
+	@for k in $(if $(ONLY),1,$(SHARES)); do \
+	    CC='$(CC)' sh tests/run.sh one build/mutants/share$$k.log build/mutants/run \
+	        $(if $(ONLY),--only $(ONLY),--share $$k/$(JOBS)) $(TESTS) & \
+	done; wait
+	@sh tests/run.sh sum build/mutants/share*.log

@@ -1,0 +1,346 @@
+#!/bin/sh
+# Every switch of the header compiles without a warning, alone and in random pairs, in every standard and
+# with every compiler at hand; and what a switch leaves out is gone from the object file.
+#
+#   sh tests/check_switches.sh           the short form, part of `make test`: $CC, C99, each switch alone
+#   sh tests/check_switches.sh full      all compilers, C99 to C17, C++11 to C++20, pairs of switches
+#
+# in the project's top directory. JOBS (2) compilations run at a time. What is not installed is skipped,
+# and a line says so.
+
+set -u
+CC=${CC:-cc}
+CXX=${CXX:-c++}
+JOBS=${JOBS:-2}
+mode=${1:-short}
+header=pathtracer.h
+dir=build/check_switches
+passed=0
+failed=0
+started=0
+
+warn='-Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wdouble-promotion'
+warn_c="$warn -Wstrict-prototypes -Wmissing-prototypes"
+
+rm -rf "$dir"
+mkdir -p "$dir" || exit 1
+
+have() { command -v "${1%% *}" > /dev/null 2>&1; }
+skip() { echo "skip   $*"; }
+ok() { passed=$((passed + 1)); [ "$mode" = full ] || [ -n "${VERBOSE-}" ] && echo "ok     $*"; return 0; }
+bad() { failed=$((failed + 1)); echo "FAIL   $*"; }
+
+# ---- programs to compile -------------------------------------------------------------------------
+
+cat > "$dir/one.c" << 'END'
+#define PATHTRACER_IMPLEMENTATION
+#include "pathtracer.h"
+END
+cp "$dir/one.c" "$dir/one.cpp"
+
+# The plain include, twice, among the standard headers; a use of each initialiser.
+cat > "$dir/plain.c" << 'END'
+#include <stdio.h>
+#include "pathtracer.h"
+#include <stdlib.h>
+#include "pathtracer.h"
+int plain(void);
+int plain(void)
+{
+    pt_scene scene = PT_SCENE_INIT;
+    pt_film film = PT_FILM_INIT;
+    pt_report report = PT_REPORT_INIT;
+    pt_stats stats = PT_STATS_INIT;
+    pt_splat_list splats = PT_SPLAT_LIST_INIT;
+    pt_splat_list_free(&splats);
+    pt_report_free(&report);
+    pt_film_free(&film);
+    pt_scene_free(&scene);
+    return stats.n > 0;
+}
+END
+cp "$dir/plain.c" "$dir/plain.cpp"
+
+# The hooks for memory, with and without a use of the user pointer, and for assertions.
+cat > "$dir/hooks.c" << 'END'
+#include <stddef.h>
+void *my_malloc(size_t size, void *user);
+void *my_realloc(void *pointer, size_t size, void *user);
+void my_free(void *pointer, void *user);
+void my_assert(int holds);
+#define PT_MALLOC(size, user) my_malloc(size, user)
+#define PT_REALLOC(pointer, size, user) my_realloc(pointer, size, user)
+#define PT_FREE(pointer, user) my_free(pointer, user)
+#define PT_ASSERT(x) my_assert(!!(x))
+#define PATHTRACER_IMPLEMENTATION
+#include "pathtracer.h"
+END
+cat > "$dir/hooks_plain.c" << 'END'
+#include <stdlib.h>
+#define PT_MALLOC(size, user) malloc(size)
+#define PT_REALLOC(pointer, size, user) realloc(pointer, size)
+#define PT_FREE(pointer, user) free(pointer)
+#define PATHTRACER_IMPLEMENTATION
+#include "pathtracer.h"
+END
+cat > "$dir/hooks_two.c" << 'END'
+#include <stdlib.h>
+#define PT_MALLOC(size, user) malloc(size)
+#define PT_FREE(pointer, user) free(pointer)
+#define PATHTRACER_IMPLEMENTATION
+#include "pathtracer.h"
+END
+
+# ---- compiling -----------------------------------------------------------------------------------
+
+# try LABEL COMMAND...: the command must succeed and say nothing. Runs in the background; collect ends
+# them all.
+try()
+{
+    started=$((started + 1))
+    echo "$1" > "$dir/job.$started"
+    shift
+    ( "$@" > "$dir/job.$started.out" 2>&1; echo $? > "$dir/job.$started.status" ) &
+    [ $((started % JOBS)) != 0 ] || wait
+}
+
+collect()
+{
+    wait
+    job=1
+    while [ $job -le $started ]; do
+        label=$(cat "$dir/job.$job")
+        if [ "$(cat "$dir/job.$job.status")" = 0 ] && [ ! -s "$dir/job.$job.out" ]; then
+            ok "$label"
+        else
+            bad "$label"
+            grep -E 'error|warning' "$dir/job.$job.out" | head -n 6
+        fi
+        job=$((job + 1))
+    done
+    rm -f "$dir"/job.*
+    started=0
+}
+
+# What makes a compiler look at everything without making code for it. gcc tells of unused functions only
+# when it compiles; tcc writes an object file always.
+checks_only() { # COMPILER
+    [ "$1" = "${known-}" ] || known=$1 version=$($1 --version 2> /dev/null)
+    case $version in *clang*) true ;; *) false ;; esac
+}
+
+# compile LABEL COMPILER FILE FLAGS...
+compile()
+{
+    label=$1 compiler=$2 file=$3
+    shift 3
+    if checks_only "$compiler"; then
+        set -- -fsyntax-only "$@"
+    else
+        set -- -O0 -c -o "$dir/$((started + 1)).o" "$@"
+    fi
+    # shellcheck disable=SC2086
+    case $file in
+    *.cpp) try "$label" $compiler $warn -Werror -I. "$@" "$dir/$file" ;;
+    *) try "$label" $compiler $warn_c -Werror -I. "$@" "$dir/$file" ;;
+    esac
+}
+
+# The names in the table SWITCHES that are given without a value.
+switches=$(sed -n '/^   SWITCHES/,/^   CONVENTIONS/p' $header |
+    awk '/^       PT_[A-Z_]+ / && $1 != "PT_ALLOW_FAST_MATH" { print $1 }')
+count=$(echo "$switches" | wc -l)
+[ "$count" -ge 10 ] || bad "the table SWITCHES of $header names only $count switches"
+
+# Pairs of switches: a congruential generator with a fixed seed, the same pairs on every machine.
+pairs()
+{
+    echo "$switches" | awk -v wanted="$1" '
+        { name[NR] = $1 }
+        END {
+            state = 20
+            while (made < wanted) {
+                state = (state * 1103515245 + 12345) % 2147483648
+                a = 1 + int(state / 65536) % NR
+                state = (state * 1103515245 + 12345) % 2147483648
+                b = 1 + int(state / 65536) % NR
+                if (a == b || (a, b) in seen) continue
+                seen[a, b] = seen[b, a] = 1
+                print "-D" name[a] " -D" name[b]
+                made++
+            }
+        }'
+}
+
+each_switch() # COMPILER FILE STANDARD
+{
+    compile "$1 $3" "$1" "$2" "$3"
+    for s in $switches; do compile "$1 $3 -D$s" "$1" "$2" "$3" "-D$s"; done
+}
+
+small_things() # COMPILER
+{
+    compile "$1: declarations only, included twice" "$1" plain.c -std=c99
+    compile "$1: own memory functions" "$1" hooks.c -std=c99
+    compile "$1: memory functions without user pointer" "$1" hooks_plain.c -std=c99
+    compile "$1: own PTDEF" "$1" one.c -std=c99 -DPTDEF=extern
+}
+
+understands() { # COMPILER FILE STANDARD
+    echo 'int x;' > "$dir/empty.${2##*.}"
+    $1 "$3" -c -o "$dir/empty.o" "$dir/empty.${2##*.}" > /dev/null 2>&1
+}
+
+# ---- symbols -------------------------------------------------------------------------------------
+
+# object NAME FILE FLAGS...: compiles to build/check_switches/NAME.o
+object()
+{
+    name=$1 file=$2
+    shift 2
+    $CC -std=c99 -O0 -I. "$@" -c "$dir/$file" -o "$dir/$name.o" 2> "$dir/$name.out"
+}
+
+# gone LABEL FLAGS PATTERN: no symbol, defined or wanted, matches the pattern, which the full build does
+# match
+gone()
+{
+    # shellcheck disable=SC2086
+    if ! object left_out one.c $2; then
+        bad "$1: does not compile"
+    elif ! nm "$dir/full.o" | awk '{ print $NF }' | grep -qE "^_?($3)\$"; then
+        bad "$1: the full build has no such symbol, so the check sees nothing: $3"
+    elif nm "$dir/left_out.o" | awk '{ print $NF }' | grep -E "^_?($3)\$" > "$dir/left_out.txt"; then
+        bad "$1: still there: $(tr '\n' ' ' < "$dir/left_out.txt")"
+    else
+        ok "$1: symbols are gone"
+    fi
+}
+
+none() # LABEL AWK-CONDITION OBJECT: no line of nm fulfils the condition (type in t, name in s)
+{
+    found=$(nm "$dir/$3.o" | awk '{ t = $(NF - 1); s = $NF; sub(/^_/, "", s) } '"$2"' { printf "%s ", s }')
+    if [ -z "$found" ]; then ok "$1"; else bad "$1: $found"; fi
+}
+
+symbols()
+{
+    have nm || { skip 'symbols: nm is not installed'; return; }
+    object full one.c || { bad "$CC does not compile the header"; head -n 5 "$dir/full.out"; return; }
+    nm "$dir/full.o" | grep -q ' T _*pt_render$' || { skip "symbols: nm cannot read what $CC makes"; return; }
+    none 'all that is public begins with pt_' 't == "T" && s !~ /^pt_/' full
+    # Without -fno-pie constant tables of pointers are data until the loader has filled them in.
+    if object fixed one.c -fno-pie; then none 'no global that can be written to' 't ~ /^[BbDdCGgSs]$/' fixed; fi
+    gone PT_NO_THREADS -DPT_NO_THREADS 'pthread_.*'
+    gone PT_NO_STDIO -DPT_NO_STDIO \
+        'fopen|fwrite|f?puts|f?putc|fclose|f?printf|sn?printf|remove|rename|pt_report_print|pt_write_.*'
+    gone PT_NO_FILES -DPT_NO_FILES 'fopen|fclose|remove|rename|pt_write_.*|pt_report_write_.*'
+    gone PT_NO_BVH -DPT_NO_BVH 'pti?_bvh_.*'
+    gone PT_NO_ENVIRONMENT -DPT_NO_ENVIRONMENT 'pt_set_environment'
+    gone PT_NO_REPORT -DPT_NO_REPORT 'pt_report_print|pt_report_write_.*'
+    gone PT_NO_SCENES -DPT_NO_SCENES 'pt_scenes|pt_scene_find|pt_scene_cornell.*|pt_cornell_.*'
+    gone PT_ONLY_PATH -DPT_ONLY_PATH 'pt_li_path_plain|pt_li_path_light|pt_scenes|pt_scene_cornell'
+    object static one.c -DPT_STATIC && none 'PT_STATIC: nothing is public' 't == "T"' static
+    object hooks hooks.c && none 'own memory functions: malloc and its kin are gone' \
+        's ~ /^(malloc|calloc|realloc|free)$/' hooks
+}
+
+# must_fail LABEL TEXT FLAGS...: the compiler refuses, and says so in the header's words
+must_fail()
+{
+    label=$1 text=$2
+    shift 2
+    if $CC -std=c99 -I. -c -o "$dir/fail.o" "$@" > "$dir/fail.out" 2>&1; then
+        bad "$label: is not refused"
+    elif grep -qF "$text" "$dir/fail.out"; then
+        ok "$label: is refused"
+    else
+        bad "$label: is refused for another reason"
+    fi
+}
+
+refusals()
+{
+    must_fail 'two of three memory functions' 'or none' "$dir/hooks_two.c"
+    if echo | $CC -ffast-math -dM -E - 2> /dev/null | grep -q '__FAST_MATH__'; then
+        must_fail '-ffast-math' 'PT_ALLOW_FAST_MATH' -ffast-math "$dir/one.c"
+        compile "$CC -ffast-math, allowed" "$CC" one.c -std=c99 -ffast-math -DPT_ALLOW_FAST_MATH
+    else
+        skip "-ffast-math: $CC does not tell of it"
+    fi
+}
+
+# ---- the two forms -------------------------------------------------------------------------------
+
+short_form()
+{
+    each_switch "$CC" one.c -std=c99
+    small_things "$CC"
+    if have "$CXX"; then
+        compile "$CXX -std=c++11" "$CXX" one.cpp -std=c++11
+        compile "$CXX -std=c++11: declarations only" "$CXX" plain.cpp -std=c++11
+    else
+        skip "$CXX is not installed"
+    fi
+    refusals
+    collect
+    symbols
+}
+
+c_compiler() # COMPILER
+{
+    have "$1" || { skip "$1 is not installed"; return; }
+    each_switch "$1" one.c -std=c99
+    small_things "$1"
+    for standard in c11 c17 gnu17; do
+        if understands "$1" one.c -std=$standard; then
+            compile "$1 -std=$standard" "$1" one.c -std=$standard
+            compile "$1 -std=$standard -DPT_DOUBLE" "$1" one.c -std=$standard -DPT_DOUBLE
+        else
+            skip "$1 does not know -std=$standard"
+        fi
+    done
+    pairs 12 > "$dir/pairs"
+    while read -r a b; do compile "$1 -std=c99 $a $b" "$1" one.c -std=c99 "$a" "$b"; done < "$dir/pairs"
+}
+
+cxx_compiler() # COMPILER
+{
+    have "$1" || { skip "$1 is not installed"; return; }
+    # The switches select the same code in C++; one compiler, the faster one, looks at each.
+    if [ "$1" != g++ ] || ! have clang++; then each_switch "$1" one.cpp -std=c++11; fi
+    for standard in c++11 c++14 c++17 c++20; do
+        if understands "$1" one.cpp -std=$standard; then
+            compile "$1 -std=$standard" "$1" one.cpp -std=$standard
+            compile "$1 -std=$standard -DPT_DOUBLE" "$1" one.cpp -std=$standard -DPT_DOUBLE
+            compile "$1 -std=$standard: declarations only" "$1" plain.cpp -std=$standard
+        else
+            skip "$1 does not know -std=$standard"
+        fi
+    done
+}
+
+full_form()
+{
+    c_compiler gcc
+    c_compiler clang
+    cxx_compiler g++
+    cxx_compiler clang++
+    if have tcc; then
+        try 'tcc -std=c99' tcc -std=c99 -Wall -Werror -I. -c -o "$dir/tcc.o" "$dir/one.c"
+    else
+        skip 'tcc is not installed'
+    fi
+    refusals
+    collect
+    symbols
+}
+
+case $mode in
+short) short_form ;;
+full) full_form ;;
+*) echo 'usage: check_switches.sh [short|full]' >&2; exit 2 ;;
+esac
+rm -f "$dir"/*.o
+echo "check_switches: $passed passed, $failed failed"
+[ $failed = 0 ]
