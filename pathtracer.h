@@ -487,21 +487,75 @@ PTDEF double pt_chi2_sf(double x, double df);
 /* The x with pt_normal_sf(x) = p, for p in (0,1). */
 PTDEF double pt_normal_isf(double p);
 
+/* How multiple importance sampling weighs techniques: by the squares of their densities, by the densities, or
+   all to the largest [Vea97] 9.2. */
+typedef enum pt_heuristic { PT_HEURISTIC_POWER = 0, PT_HEURISTIC_BALANCE, PT_HEURISTIC_MAXIMUM } pt_heuristic;
+
+/* The weight of technique 1 with density p1 against technique 2 with density p2, as a ratio that cannot
+   overflow. p1 = 0 gives 0; equal densities share, but for the maximum heuristic, where the first takes all. */
+PTDEF double pt_mis_weight(double p1, double p2, pt_heuristic heuristic);
+
 /* An integrand on the unit cube: u holds `dimensions` numbers in [0,1). */
 typedef double (*pt_integrand)(const double *u, void *user);
+
+/* A way to draw points x: warp takes u in [0,1)^d to x, density gives its density at x (also for points that
+   another technique drew). */
+typedef struct pt_technique {
+    void (*warp)(const double *u, double *x, void *user);
+    double (*density)(const double *x, void *user);
+    void *user;
+} pt_technique;
+
+/* What to integrate and with which numbers. */
+typedef struct pt_integral {
+    pt_integrand f;          /* over [0,1)^dimensions, or over the points of a technique                   */
+    void *user;
+    int dimensions;          /* in [1, 64]                                                                 */
+    uint32_t n;              /* values of the estimator to average, >= 32                                  */
+    pt_sampler_kind sampler; /* the first three kinds; Sobol and stratified: 32 independent randomisations
+                                of n / 32 points each, whose spread gives the standard error               */
+    uint64_t seed;
+} pt_integral;
 
 /* What an estimate of an integral reports. */
 typedef struct pt_estimate {
     double value, standard_error; /* the mean, and the standard deviation of that mean                     */
-    double evaluations;           /* how often the integrand was called                                    */
+    double evaluations;           /* how often f was called                                                */
     double seconds;               /* CPU seconds                                                           */
+    double efficiency;            /* 1 / (standard_error^2 * seconds); 0 if one of them is 0               */
+    pt_stats units;               /* the independent values behind it: n values, or 32 means               */
 } pt_estimate;
 
-/* Integrates f over the unit cube by the mean of n values. For Sobol and stratified points the n values are
-   split into 32 independent randomisations of n/32 points each, whose spread gives the standard error.
-   dimensions in [1,64], n >= 32. */
-PTDEF pt_result pt_estimate_mean(pt_integrand f, void *user, int dimensions, uint32_t n, pt_sampler_kind kind,
-                                 uint64_t seed, pt_estimate *out);
+/* Estimators of the integral, each unbiased. PT_ERROR_ARGUMENT for values outside the ranges named. */
+
+/* The mean of f(u): plain Monte Carlo, stratified or quasi-random, as p->sampler says. */
+PTDEF pt_result pt_estimate_mean(const pt_integral *p, pt_estimate *out);
+/* The mean of (f(u) + f(1 - u)) / 2: exact for integrands that are odd about the centre of the cube. */
+PTDEF pt_result pt_estimate_antithetic(const pt_integral *p, pt_estimate *out);
+/* Importance sampling: the mean of f(x) / density(x). The density must be positive wherever f is not zero. */
+PTDEF pt_result pt_estimate_importance(const pt_integral *p, const pt_technique *technique, pt_estimate *out);
+/* Control variate: the mean of f(u) - c (g(u) - G) with a g whose integral G is known; g gets p->user. */
+PTDEF pt_result pt_estimate_control(const pt_integral *p, pt_integrand g, double g_integral, double c,
+                                    pt_estimate *out);
+/* Multiple importance sampling with counts[i] >= 0 samples of each of `count` techniques, in [1, 8], a value
+   [Vea97] 9.2; and with one sample a value, from technique i with probability share[i]: the shares sum to 1. */
+PTDEF pt_result pt_estimate_mis(const pt_integral *p, const pt_technique *techniques, const int *counts, int count,
+                                pt_heuristic heuristic, pt_estimate *out);
+PTDEF pt_result pt_estimate_mis_one(const pt_integral *p, const pt_technique *techniques, const double *shares,
+                                    int count, pt_heuristic heuristic, pt_estimate *out);
+/* Russian roulette: f(u) / q with probability q in (0,1], else 0 without calling f [Arv90]. */
+PTDEF pt_result pt_estimate_roulette(const pt_integral *p, double q, pt_estimate *out);
+/* Splitting: the first `outer` numbers are drawn once, the others `splits` times [Arv90]. */
+PTDEF pt_result pt_estimate_splitting(const pt_integral *p, int outer, int splits, pt_estimate *out);
+
+/* Probabilities of a deviation at least as large as the one seen, if there is no bias (two-sided): of a mean
+   against its exact value (Student, n - 1 degrees of freedom), of two means (Welch), and of counts against
+   expected counts (chi-squared, cells pooled from the left until 5 are expected). 1 where n is too small. */
+PTDEF double pt_p_value_mean(const pt_stats *s, double exact);
+PTDEF double pt_p_value_equal_means(const pt_stats *a, const pt_stats *b);
+PTDEF double pt_p_value_counts(const double *observed, const double *expected, int cells);
+/* Half the width of the interval that contains the true mean with the given confidence in (0,1). */
+PTDEF double pt_stats_interval(const pt_stats *s, double confidence);
 
 /* =====================================================================================================
    [PT-04] SAMPLING WARPS: declarations. u is uniform on [0,1)^2; local directions have z along the axis.
@@ -1067,8 +1121,6 @@ typedef enum pt_roulette {
     PT_ROULETTE_NONE            /* only max_edges ends a path: needs max_edges > 0                           */
 } pt_roulette;
 
-typedef enum pt_heuristic { PT_HEURISTIC_POWER = 0, PT_HEURISTIC_BALANCE } pt_heuristic;
-
 #if PTI_HAS_OBSERVER
 /* Told of each contribution to a path's radiance, for light-path expressions: `word` reads from the light to
    the eye over L D G S E ("LDDE"), `value` is already weighted. With more than PT_WORD_MAX letters between L
@@ -1121,10 +1173,6 @@ PTDEF pt_rgbd pt_li_path_plain(const pt_scene *scene, const pt_ray *ray, pt_samp
 PTDEF pt_rgbd pt_li_path_light(const pt_scene *scene, const pt_ray *ray, pt_sampler *sampler,
                                const pt_li_options *options, pt_li_info *info);
 #endif
-
-/* The weight of technique 1 with density p1 against technique 2 with density p2, as a ratio that cannot
-   overflow [Vea97] 9.2. p1 = 0 gives 0. */
-PTDEF double pt_mis_weight(double p1, double p2, pt_heuristic heuristic);
 
 /* =====================================================================================================
    [PT-17] IMAGE FILES: declarations
@@ -2140,33 +2188,300 @@ PTDEF double pt_chi2_sf(double x, double df)
     return front / f;
 }
 
-PTDEF pt_result pt_estimate_mean(pt_integrand f, void *user, int dimensions, uint32_t n, pt_sampler_kind kind,
-                                 uint64_t seed, pt_estimate *out)
+PTDEF double pt_p_value_mean(const pt_stats *s, double exact)
 {
-    /* Independent numbers: every value is a unit of the statistics. Else: every randomised point set is. */
-    uint32_t sets = kind == PT_SAMPLER_INDEPENDENT ? n : 32, points, set, i;
-    pt_stats stats = PT_STATS_INIT;
-    double start = pt_cpu_seconds(), u[64];
+    double se = pt_stats_standard_error(s);
+    if (!(se > 0)) return s->mean == exact || s->n < 2 ? 1 : 0;
+    return 2 * pt_student_sf(fabs(s->mean - exact) / se, s->n - 1);
+}
+
+PTDEF double pt_p_value_equal_means(const pt_stats *a, const pt_stats *b)
+{
+    /* Welch: degrees of freedom after Satterthwaite. */
+    double va, vb, v;
+    if (a->n < 2 || b->n < 2) return 1;
+    va = pt_stats_variance(a) / a->n;
+    vb = pt_stats_variance(b) / b->n;
+    v = va + vb;
+    if (!(v > 0)) return a->mean == b->mean ? 1 : 0;
+    return 2 * pt_student_sf(fabs(a->mean - b->mean) / sqrt(v),
+                             v * v / (va * va / (a->n - 1) + vb * vb / (b->n - 1)));
+}
+
+PTDEF double pt_p_value_counts(const double *observed, const double *expected, int cells)
+{
+    double o = 0, e = 0, chi2 = 0, last_o = 0, last_e = 0;
+    int i, used = 0;
+    for (i = 0; i < cells; i++) {
+        o += observed[i];
+        e += expected[i];
+        if (e < 5) continue;
+        if (used > 0) chi2 += (last_o - last_e) * (last_o - last_e) / last_e;
+        last_o = o;
+        last_e = e;
+        o = e = 0;
+        used++;
+    }
+    if (used < 2) return 1;
+    last_o += o; /* what is left joins the last cell */
+    last_e += e;
+    chi2 += (last_o - last_e) * (last_o - last_e) / last_e;
+    return pt_chi2_sf(chi2, used - 1);
+}
+
+PTDEF double pt_stats_interval(const pt_stats *s, double confidence)
+{
+    double lo = 0, hi = 1e9, p = (1 - confidence) / 2;
+    int i;
+    if (s->n < 2) return HUGE_VAL;
+    for (i = 0; i < 100; i++) { /* the quantile of Student's t by bisection */
+        double mid = 0.5 * (lo + hi);
+        if (pt_student_sf(mid, s->n - 1) > p) lo = mid;
+        else hi = mid;
+    }
+    return hi * pt_stats_standard_error(s);
+}
+
+PTDEF double pt_mis_weight(double p1, double p2, pt_heuristic heuristic)
+{
+    double r;
+    if (!(p1 > 0)) return 0;
+    if (heuristic == PT_HEURISTIC_MAXIMUM) return p1 >= p2;
+    if (p1 == p2) return 0.5; /* two infinite ones too */
+    r = p2 / p1;
+    return heuristic == PT_HEURISTIC_POWER ? 1 / (1 + r * r) : 1 / (1 + r);
+}
+
+/* An estimator at work: value() draws what it needs from the sampler and returns one value, whose expectation
+   is the integral. */
+typedef struct pti_estimator {
+    const pt_integral *p;
+    double (*value)(struct pti_estimator *e);
     pt_sampler sampler;
+    double calls;
+    const pt_technique *techniques;
+    const int *counts;
+    const double *shares;
+    int technique_count;
+    pt_heuristic heuristic;
+    pt_integrand g;
+    double g_integral, coefficient, survival;
+    int outer, splits;
+} pti_estimator;
+
+static double pti_call(pti_estimator *e, const double *x)
+{
+    e->calls++;
+    return e->p->f(x, e->p->user);
+}
+
+static void pti_draw_numbers(pti_estimator *e, double *u, int from, int to)
+{
     int d;
+    for (d = from; d < to; d++) u[d] = pti_draw(&e->sampler);
+}
+
+static double pti_value_mean(pti_estimator *e)
+{
+    double u[64];
+    pti_draw_numbers(e, u, 0, e->p->dimensions);
+    return pti_call(e, u);
+}
+
+static double pti_value_antithetic(pti_estimator *e)
+{
+    double u[64], v[64];
+    int d;
+    pti_draw_numbers(e, u, 0, e->p->dimensions);
+    for (d = 0; d < e->p->dimensions; d++) v[d] = 1 - u[d];
+    return 0.5 * (pti_call(e, u) + pti_call(e, v));
+}
+
+static double pti_value_control(pti_estimator *e)
+{
+    double u[64];
+    pti_draw_numbers(e, u, 0, e->p->dimensions);
+    return pti_call(e, u) - e->coefficient * (e->g(u, e->p->user) - e->g_integral);
+}
+
+/* Weight of technique i for point x: (n_i p_i)^k / sum (n_j p_j)^k, k = 1, 2 or infinity, as ratios to n_i p_i. */
+static double pti_technique_weight(const pti_estimator *e, int i, double own, const double *x)
+{
+    double sum = 1;
+    int j;
+    for (j = 0; j < e->technique_count; j++) {
+        double n = e->shares ? e->shares[j] : e->counts[j], r;
+        if (j == i || !(n > 0)) continue;
+        r = n * e->techniques[j].density(x, e->techniques[j].user) / own;
+        if (e->heuristic == PT_HEURISTIC_MAXIMUM) {
+            if (r > 1 || (r == 1 && j < i)) return 0; /* a tie goes to the first */
+        } else {
+            sum += e->heuristic == PT_HEURISTIC_POWER ? r * r : r;
+        }
+    }
+    return 1 / sum;
+}
+
+/* One sample of technique i, weighted, over its density times n. */
+static double pti_technique_value(pti_estimator *e, int i, double n)
+{
+    const pt_technique *t = &e->techniques[i];
+    double u[64], x[64], own;
+    pti_draw_numbers(e, u, 0, e->p->dimensions);
+    t->warp(u, x, t->user);
+    own = n * t->density(x, t->user);
+    if (!(own > 0)) return 0;
+    return pti_call(e, x) * pti_technique_weight(e, i, own, x) / own;
+}
+
+static double pti_value_mis(pti_estimator *e)
+{
+    double sum = 0;
+    int i, k;
+    for (i = 0; i < e->technique_count; i++)
+        for (k = 0; k < e->counts[i]; k++) sum += pti_technique_value(e, i, e->counts[i]);
+    return sum;
+}
+
+static double pti_value_mis_one(pti_estimator *e)
+{
+    double u = pti_draw(&e->sampler);
+    int i;
+    for (i = 0; i < e->technique_count - 1 && u >= e->shares[i]; i++) u -= e->shares[i];
+    return pti_technique_value(e, i, e->shares[i]);
+}
+
+static double pti_value_roulette(pti_estimator *e)
+{
+    double u[64];
+    if (!(pti_draw(&e->sampler) < e->survival)) return 0;
+    pti_draw_numbers(e, u, 0, e->p->dimensions);
+    return pti_call(e, u) / e->survival;
+}
+
+static double pti_value_splitting(pti_estimator *e)
+{
+    double u[64], sum = 0;
+    int k;
+    pti_draw_numbers(e, u, 0, e->outer);
+    for (k = 0; k < e->splits; k++) {
+        pti_draw_numbers(e, u, e->outer, e->p->dimensions);
+        sum += pti_call(e, u);
+    }
+    return sum / e->splits;
+}
+
+/* Averages p->n values. Independent numbers: every value is a unit of the statistics. Else: every randomised
+   point set is. */
+static pt_result pti_estimate(pti_estimator *e, const pt_integral *p, double (*value)(pti_estimator *), pt_estimate *out)
+{
+    uint32_t sets = p->sampler == PT_SAMPLER_INDEPENDENT ? p->n : 32, points, set, i;
+    double start = pt_cpu_seconds(), se;
     memset(out, 0, sizeof *out);
-    if (!f || dimensions < 1 || dimensions > 64 || n < 32 || kind == PT_SAMPLER_GIVEN) return PT_ERROR_ARGUMENT;
-    points = n / sets;
-    sampler = pt_sampler_make(kind, seed, points);
+    if (!value || !p->f || p->dimensions < 1 || p->dimensions > 64 || p->n < 32) return PT_ERROR_ARGUMENT;
+    if ((int)p->sampler < 0 || p->sampler >= PT_SAMPLER_GIVEN) return PT_ERROR_ARGUMENT;
+    points = p->n / sets;
+    e->p = p;
+    e->calls = 0;
+    e->sampler = pt_sampler_make(p->sampler, p->seed, points);
     for (set = 0; set < sets; set++) {
         double sum = 0;
         for (i = 0; i < points; i++) {
-            pt_sampler_start(&sampler, set, i);
-            for (d = 0; d < dimensions; d++) u[d] = pti_draw(&sampler);
-            sum += f(u, user);
+            pt_sampler_start(&e->sampler, set, i);
+            sum += value(e);
         }
-        pt_stats_add(&stats, sum / points);
+        pt_stats_add(&out->units, sum / points);
     }
-    out->value = stats.mean;
-    out->standard_error = pt_stats_standard_error(&stats);
-    out->evaluations = (double)sets * points;
+    se = pt_stats_standard_error(&out->units);
+    out->value = out->units.mean;
+    out->standard_error = se;
+    out->evaluations = e->calls;
     out->seconds = pt_cpu_seconds() - start;
+    out->efficiency = se > 0 && out->seconds > 0 ? 1 / (se * se * out->seconds) : 0;
     return PT_OK;
+}
+
+PTDEF pt_result pt_estimate_mean(const pt_integral *p, pt_estimate *out)
+{
+    pti_estimator e;
+    memset(&e, 0, sizeof e);
+    return pti_estimate(&e, p, pti_value_mean, out);
+}
+
+PTDEF pt_result pt_estimate_antithetic(const pt_integral *p, pt_estimate *out)
+{
+    pti_estimator e;
+    memset(&e, 0, sizeof e);
+    return pti_estimate(&e, p, pti_value_antithetic, out);
+}
+
+PTDEF pt_result pt_estimate_importance(const pt_integral *p, const pt_technique *technique, pt_estimate *out)
+{
+    static const int once = 1;
+    return pt_estimate_mis(p, technique, &once, 1, PT_HEURISTIC_BALANCE, out);
+}
+
+PTDEF pt_result pt_estimate_control(const pt_integral *p, pt_integrand g, double g_integral, double c, pt_estimate *out)
+{
+    pti_estimator e;
+    memset(&e, 0, sizeof e);
+    e.g = g;
+    e.g_integral = g_integral;
+    e.coefficient = c;
+    return pti_estimate(&e, p, g && pti_finite(g_integral) && pti_finite(c) ? pti_value_control : NULL, out);
+}
+
+PTDEF pt_result pt_estimate_mis(const pt_integral *p, const pt_technique *techniques, const int *counts, int count,
+                                pt_heuristic heuristic, pt_estimate *out)
+{
+    pti_estimator e;
+    int i, all = 0, ok = techniques && counts && count >= 1 && count <= 8;
+    memset(&e, 0, sizeof e);
+    for (i = 0; ok && i < count; i++) {
+        ok = counts[i] >= 0 && counts[i] <= 1024;
+        all += counts[i];
+    }
+    e.techniques = techniques;
+    e.counts = counts;
+    e.technique_count = count;
+    e.heuristic = heuristic;
+    return pti_estimate(&e, p, ok && all > 0 ? pti_value_mis : NULL, out);
+}
+
+PTDEF pt_result pt_estimate_mis_one(const pt_integral *p, const pt_technique *techniques, const double *shares,
+                                    int count, pt_heuristic heuristic, pt_estimate *out)
+{
+    pti_estimator e;
+    double sum = 0;
+    int i, ok = techniques && shares && count >= 1 && count <= 8;
+    memset(&e, 0, sizeof e);
+    for (i = 0; ok && i < count; i++) {
+        ok = shares[i] >= 0;
+        sum += shares[i];
+    }
+    e.techniques = techniques;
+    e.shares = shares;
+    e.technique_count = count;
+    e.heuristic = heuristic;
+    /* a sum of up to eight rounded shares is off by no more than eight roundings */
+    return pti_estimate(&e, p, ok && fabs(sum - 1) <= 8 * PTI_2_M53 ? pti_value_mis_one : NULL, out);
+}
+
+PTDEF pt_result pt_estimate_roulette(const pt_integral *p, double q, pt_estimate *out)
+{
+    pti_estimator e;
+    memset(&e, 0, sizeof e);
+    e.survival = q;
+    return pti_estimate(&e, p, q > 0 && q <= 1 ? pti_value_roulette : NULL, out);
+}
+
+PTDEF pt_result pt_estimate_splitting(const pt_integral *p, int outer, int splits, pt_estimate *out)
+{
+    pti_estimator e;
+    memset(&e, 0, sizeof e);
+    e.outer = outer;
+    e.splits = splits;
+    return pti_estimate(&e, p, outer >= 1 && outer < p->dimensions && splits >= 1 ? pti_value_splitting : NULL, out);
 }
 
 /* =====================================================================================================
@@ -4775,15 +5090,6 @@ PTDEF void pt_film_error(const pt_film *film, const float *reference, pt_error *
    The body is written once, with the features a scene may need as a constant mask: pti_path below is compiled
    for each mask that the driver picks from. */
 
-PTDEF double pt_mis_weight(double p1, double p2, pt_heuristic heuristic)
-{
-    double r;
-    if (!(p1 > 0)) return 0;
-    if (p1 == p2) return 0.5; /* two infinite ones too */
-    r = p2 / p1;
-    return heuristic == PT_HEURISTIC_POWER ? 1 / (1 + r * r) : 1 / (1 + r);
-}
-
 enum { PTI_TECHNIQUE_PLAIN, PTI_TECHNIQUE_LIGHT, PTI_TECHNIQUE_MIS };
 
 /* Features that an instance of the integrator may leave out. */
@@ -5777,7 +6083,7 @@ static const char *pti_check_desc(const pt_render_desc *d)
     if (o->max_edges < 0) return "desc.li.max_edges is negative";
     if (o->roulette_start < 0) return "desc.li.roulette_start is negative";
     if ((int)o->roulette < 0 || o->roulette > PT_ROULETTE_NONE) return "desc.li.roulette is unknown";
-    if ((int)o->heuristic < 0 || o->heuristic > PT_HEURISTIC_BALANCE) return "desc.li.heuristic is unknown";
+    if ((int)o->heuristic < 0 || o->heuristic > PT_HEURISTIC_MAXIMUM) return "desc.li.heuristic is unknown";
     if (!(o->roulette_survival >= 0 && o->roulette_survival < 1)) return "desc.li.roulette_survival is not in [0,1)";
     if (o->roulette == PT_ROULETTE_NONE && o->max_edges == 0) return "without roulette desc.li.max_edges must end the paths";
     if (!pt_method_find(d->method)) return "desc.method is unknown";

@@ -182,7 +182,7 @@ static int set_spp(tool *t, const char *name, const char *value)
 {
     uint64_t n;
 
-    if (!parse_whole(value, UINT32_MAX, &n) || n == 0) return bad_value(name, value, "in 1..4294967295");
+    if (!parse_whole(value, UINT32_MAX - 1, &n) || n == 0) return bad_value(name, value, "in 1..4294967294");
     t->desc.spp = (uint32_t)n;
     return EXIT_OK;
 }
@@ -516,7 +516,8 @@ static int deliver(const tool *t, pt_result result, const pt_film *film, const p
     int ok;
 
     if (result != PT_OK && result != PT_ERROR_CANCELLED) {
-        fprintf(stderr, "render: %s: %s\n", t->scene_name, pt_result_string(result));
+        fprintf(stderr, "render: %s: %s\n", t->scene_name,
+                report->error ? report->error : pt_result_string(result));
         return EXIT_FAILED;
     }
     if (result == PT_ERROR_CANCELLED && pt_film_spp(film) == 0) {

@@ -243,7 +243,7 @@ static int compile(const char *dir, const char *program)
 /* Makes an empty directory in which a test finds what it expects in the project's top directory. */
 static int make_directory(const char *dir)
 {
-    return shell("rm -rf %s && mkdir -p %s/build && ln -s ../../../tests %s/tests", dir, dir, dir);
+    return shell("rm -rf %s && mkdir -p %s/build/test && ln -s ../../../tests %s/tests", dir, dir, dir);
 }
 
 /* Runs a compiled test with limits of time and memory, so that a mutant that runs away ends too. Its

@@ -154,11 +154,11 @@ static inline int pt_test_skip(const char *name, int too_few)
 }
 
 /* A mean and what it should be. skewness: of the mean, that of one value / sqrt n; df: 0 = normal. */
-typedef struct pt_test_mean {
+typedef struct pt_judged_mean {
     double n, value, exact, se, skewness, df;
-} pt_test_mean;
+} pt_judged_mean;
 
-static inline void pt_test_judge(const char *name, const pt_test_mean *m, double bound, int reject,
+static inline void pt_test_judge(const char *name, const pt_judged_mean *m, double bound, int reject,
                                  const char *hint)
 {
     const int relative = m->exact < 0 || m->exact > 0;
@@ -185,7 +185,7 @@ static inline void pt_test_judge_mean(const char *name, const pt_stats *s, doubl
                                       double bound, int df_mode, int reject, const char *hint)
 {
     const double se = pt_stats_standard_error(s), rounding = 0x1p-50 * fabs(exact);
-    pt_test_mean m = {s->n, s->mean, exact, 0, 0, 0};
+    pt_judged_mean m = {s->n, s->mean, exact, 0, 0, 0};
     m.se = sqrt(se * se + exact_error * exact_error + rounding * rounding);
     if (df_mode == PT_TEST_MEANS) m.df = s->n - 1;
     else if (se > 0) m.skewness = pt_stats_skewness(s) / sqrt(s->n) * pow(se / m.se, 3);
@@ -206,7 +206,7 @@ static inline void pt_check_equal_means(const char *name, const pt_stats *a, con
 {
     const double ea = pt_stats_standard_error(a), va = ea * ea, eb = pt_stats_standard_error(b), vb = eb * eb;
     const double ga = pt_stats_skewness(a) / sqrt(a->n), gb = pt_stats_skewness(b) / sqrt(b->n);
-    pt_test_mean m = {a->n < b->n ? a->n : b->n, a->mean, b->mean, 0, 0, 0};
+    pt_judged_mean m = {a->n < b->n ? a->n : b->n, a->mean, b->mean, 0, 0, 0};
     m.se = sqrt(va + vb + 0x1p-100 * b->mean * b->mean);
     if (va + vb > 0) m.df = (va + vb) * (va + vb) / (va * va / (a->n - 1) + vb * vb / (b->n - 1));
     if (va + vb > 0 && m.n > PT_TEST_REPLICATIONS) m.skewness = (ga * va * ea - gb * vb * eb) / pow(m.se, 3);
@@ -256,5 +256,13 @@ static inline void pt_test_judge_chi2(const char *name, const double *observed, 
     pt_test_judge_chi2(name, observed, expected, cells, 0, hint)
 #define pt_check_rejects_chi2(name, observed, expected, cells, hint) \
     pt_test_judge_chi2(name, observed, expected, cells, 1, hint)
+
+/* The mean of n values of f over the unit cube, see pt_estimate_mean. */
+static inline pt_result integrate(pt_integrand f, void *user, int dimensions, uint32_t n, pt_sampler_kind kind,
+                                  uint64_t seed, pt_estimate *out)
+{
+    const pt_integral p = {f, user, dimensions, n, kind, seed};
+    return pt_estimate_mean(&p, out);
+}
 
 #endif /* PT_TEST_H */

@@ -1066,7 +1066,7 @@ static double picture_value(int half, size_t k)
 {
     static const double odd[6] = {-1, 0, 1, 7, 0.0031308, 1e-9};
     if (k < 6) return odd[k];
-    if (k == 6 && half == 0) return NAN;
+    if (k == 6 && half == 0) return (double)NAN;
     return (double)((k * 7919) % 1009) / 1000;
 }
 
@@ -1460,7 +1460,7 @@ static void files_refused(void)
     pt_check(pt_write_ppm(out("c"), &empty, 1) == PT_ERROR_ARGUMENT &&
                  pt_write_pfm(out("c"), &empty) == PT_ERROR_ARGUMENT &&
                  pt_write_png(out("c"), &empty, 1) == PT_ERROR_ARGUMENT &&
-                 pt_write_ppm(out("c"), &f, NAN) == PT_ERROR_ARGUMENT &&
+                 pt_write_ppm(out("c"), &f, (double)NAN) == PT_ERROR_ARGUMENT &&
                  pt_write_ppm(out("c"), &f, -1) == PT_ERROR_ARGUMENT &&
                  pt_write_png(out("c"), &f, HUGE_VAL) == PT_ERROR_ARGUMENT,
              "nothing to write", "no PT_ERROR_ARGUMENT");

@@ -753,8 +753,8 @@ static void thin_gaps(void)
                              real3(scale(edge2, 2)), m);
         if (commit(&scene))
             for (i = 0; i < rays; i++) {
-                const vec aim = add(
-                    at, add(scale(edge1, uniform(&rng, -0.5, 0.5)), scale(edge2, uniform(&rng, -0.5, 0.5))));
+                const double a = uniform(&rng, -0.5, 0.5), b = uniform(&rng, -0.5, 0.5);
+                const vec aim = add(at, add(scale(edge1, a), scale(edge2, b)));
                 const pt_vec3 from = real3(add(aim, scale(n, 2)));
                 const pt_ray ray = ray_of(from, real3(sub(aim, vec_of(from))));
                 pt_hit hit, second;
@@ -930,9 +930,8 @@ static void soup(pt_scene *scene, pt_pcg32 *rng, int count, double size, double 
 {
     int i;
     for (i = 0; i < count; i++) {
-        const vec a = random_vec(rng, size);
-        pt_add_triangle(scene, real3(a), real3(add(a, random_vec(rng, triangle))),
-                        real3(add(a, random_vec(rng, triangle))), material);
+        const vec a = random_vec(rng, size), b = random_vec(rng, triangle), c = random_vec(rng, triangle);
+        pt_add_triangle(scene, real3(a), real3(add(a, b)), real3(add(a, c)), material);
     }
 }
 
@@ -950,8 +949,10 @@ static void tree_is_linear_search(void)
         uint32_t degenerate = 0;
         if (c < 2) soup(&scene, &rng, 600, 1, c == 0 ? 0.15 : 1, m);
         if (c == 2) soup(&scene, &rng, 300, 1, 0.3, m);
-        for (i = 0; c == 2 && i < 100; i++)
-            pt_add_sphere(&scene, real3(random_vec(&rng, 1)), (pt_real)uniform(&rng, 0.01, 0.2), m);
+        for (i = 0; c == 2 && i < 100; i++) {
+            const vec a = random_vec(&rng, 1);
+            pt_add_sphere(&scene, real3(a), (pt_real)uniform(&rng, 0.01, 0.2), m);
+        }
         for (i = 0; c == 3 && i < 400; i++)
             pt_add_triangle(&scene, pt_v3(-1, -1, 0), pt_v3(1, -1, (pt_real)0.1), pt_v3(0, 1, (pt_real)0.3),
                             m);
@@ -1003,8 +1004,8 @@ static void ties(void)
                              m);
     if (!commit(&scene)) return;
     for (i = 0; i < 20000; i++) {
-        const vec o = vec3(uniform(&rng, -3, 3), uniform(&rng, 1, 5), uniform(&rng, -3, 3));
-        const vec aim = vec3(uniform(&rng, -0.9, 0.9), 0.2, uniform(&rng, -0.9, 0.9));
+        const vec o = add(vec3(0, 3, 0), random_vec(&rng, 2)), r = random_vec(&rng, 0.9);
+        const vec aim = vec3(r.x, 0.2, r.z);
         const pt_ray ray = ray_of(real3(o), real3(sub(aim, o)));
         if (!pt_intersect(&scene, &ray, &hit) || hit.shape != PT_SHAPE_PARALLELOGRAM) continue;
         wrong += scene.primitives[hit.primitive].index != 0;

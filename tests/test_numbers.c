@@ -720,7 +720,7 @@ static void one_integral(const integral *f, int kind, uint64_t seed)
     for (i = 0; i < runs; i++) {
         pt_estimate e;
         const pt_result r =
-            pt_estimate_mean(f->f, &power, f->dimensions, n, kinds[kind], pt_test_seed(seed + i), &e);
+            integrate(f->f, &power, f->dimensions, n, kinds[kind], pt_test_seed(seed + i), &e);
         pt_check(r == PT_OK && e.evaluations == n && e.seconds >= 0, f->name, "result %d, %g evaluations",
                  (int)r, e.evaluations);
         pt_stats_add(&value, e.value);
@@ -750,7 +750,7 @@ static void spread_points_pay(void)
     double power = 2;
     pt_estimate e[3];
     int k;
-    for (k = 0; k < 3; k++) pt_estimate_mean(power_of, &power, 1, 1u << 16, kinds[k], 5, &e[k]);
+    for (k = 0; k < 3; k++) integrate(power_of, &power, 1, 1u << 16, kinds[k], 5, &e[k]);
     pt_check(e[0].standard_error < 0.02 * e[1].standard_error, "Sobol points beat independent ones",
              "%g against %g", e[0].standard_error, e[1].standard_error);
     pt_check(e[2].standard_error < 0.02 * e[1].standard_error, "strata beat independent points",
@@ -761,15 +761,15 @@ static void estimates_refuse(void)
 {
     pt_estimate e;
     double p = 1;
-    pt_check(pt_estimate_mean(NULL, &p, 1, 100, PT_SAMPLER_SOBOL, 0, &e) == PT_ERROR_ARGUMENT, "no integrand",
+    pt_check(integrate(NULL, &p, 1, 100, PT_SAMPLER_SOBOL, 0, &e) == PT_ERROR_ARGUMENT, "no integrand",
              "accepted");
-    pt_check(pt_estimate_mean(power_of, &p, 0, 100, PT_SAMPLER_SOBOL, 0, &e) == PT_ERROR_ARGUMENT,
+    pt_check(integrate(power_of, &p, 0, 100, PT_SAMPLER_SOBOL, 0, &e) == PT_ERROR_ARGUMENT,
              "0 dimensions", "accepted");
-    pt_check(pt_estimate_mean(power_of, &p, 65, 100, PT_SAMPLER_SOBOL, 0, &e) == PT_ERROR_ARGUMENT,
+    pt_check(integrate(power_of, &p, 65, 100, PT_SAMPLER_SOBOL, 0, &e) == PT_ERROR_ARGUMENT,
              "65 dimensions", "accepted");
-    pt_check(pt_estimate_mean(power_of, &p, 1, 31, PT_SAMPLER_SOBOL, 0, &e) == PT_ERROR_ARGUMENT, "31 points",
+    pt_check(integrate(power_of, &p, 1, 31, PT_SAMPLER_SOBOL, 0, &e) == PT_ERROR_ARGUMENT, "31 points",
              "accepted");
-    pt_check(pt_estimate_mean(power_of, &p, 64, 32, PT_SAMPLER_SOBOL, 0, &e) == PT_OK,
+    pt_check(integrate(power_of, &p, 64, 32, PT_SAMPLER_SOBOL, 0, &e) == PT_OK,
              "64 dimensions, 32 points", "refused");
 }
 
