@@ -6079,7 +6079,7 @@ static const char *pti_check_desc(const pt_render_desc *d)
     if ((int)d->sampler < 0 || d->sampler >= PT_SAMPLER_GIVEN) return "desc.sampler is not sobol, independent or stratified";
     if (d->sampler == PT_SAMPLER_STRATIFIED && timed) return "the stratified sampler needs a sample count, not a time or error budget";
     if (d->single_net && d->target_error > 0) return "desc.single_net has no error estimate for desc.target_error";
-    if (d->spp > UINT32_MAX - 1 - d->first_sample) return "desc.first_sample + desc.spp is beyond 2^32 - 2";
+    if (d->first_sample == UINT32_MAX || d->spp > UINT32_MAX - 1 - d->first_sample) return "desc.first_sample + desc.spp is beyond 2^32 - 2";
     if (o->max_edges < 0) return "desc.li.max_edges is negative";
     if (o->roulette_start < 0) return "desc.li.roulette_start is negative";
     if ((int)o->roulette < 0 || o->roulette > PT_ROULETTE_NONE) return "desc.li.roulette is unknown";

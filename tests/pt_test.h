@@ -257,12 +257,4 @@ static inline void pt_test_judge_chi2(const char *name, const double *observed, 
 #define pt_check_rejects_chi2(name, observed, expected, cells, hint) \
     pt_test_judge_chi2(name, observed, expected, cells, 1, hint)
 
-/* The mean of n values of f over the unit cube, see pt_estimate_mean. */
-static inline pt_result integrate(pt_integrand f, void *user, int dimensions, uint32_t n, pt_sampler_kind kind,
-                                  uint64_t seed, pt_estimate *out)
-{
-    const pt_integral p = {f, user, dimensions, n, kind, seed};
-    return pt_estimate_mean(&p, out);
-}
-
 #endif /* PT_TEST_H */

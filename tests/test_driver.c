@@ -721,7 +721,7 @@ static void check_estimate(const char *name, const stage *s, pt_render_desc d, u
     pt_stats difference = PT_STATS_INIT, t = PT_STATS_INIT, ratio;
     double reach;
     uint32_t i;
-    for (i = 0; i < seeds; i++) {
+    for (i = 0, seeds = pt_test_samples(seeds); i < seeds; i++) {
         pt_error estimated, real;
         pt_film film;
         d.seed = pt_test_seed(5000 + i);
@@ -784,7 +784,7 @@ static void estimated_error_cornell(void)
     truth reference;
     int i, k;
     s.camera = pt_camera_look_at(pt_v3(278, 273, -800), pt_v3(278, 200, 280), pt_v3(0, 1, 0), 24);
-    d = desc_of(&s, SIDE, SIDE, pt_test_long() ? 32768 : 2048);
+    d = desc_of(&s, SIDE, SIDE, pt_test_long() ? 32768 : pt_test_samples(2048));
     d.seed = pt_test_seed(4999);
     film = render(&s, &d);
     for (i = 0; i < SIDE * SIDE; i++) {

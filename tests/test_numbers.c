@@ -694,6 +694,13 @@ static double product_of_five(const double *u, void *user)
     return u[0] * u[1] * u[2] * u[3] * u[4];
 }
 
+static pt_result integrate(pt_integrand f, void *user, int dimensions, uint32_t n, pt_sampler_kind kind,
+                           uint64_t seed, pt_estimate *out)
+{
+    const pt_integral p = {f, user, dimensions, n, kind, seed};
+    return pt_estimate_mean(&p, out);
+}
+
 typedef struct integral {
     const char *name;
     pt_integrand f;
@@ -763,14 +770,168 @@ static void estimates_refuse(void)
     double p = 1;
     pt_check(integrate(NULL, &p, 1, 100, PT_SAMPLER_SOBOL, 0, &e) == PT_ERROR_ARGUMENT, "no integrand",
              "accepted");
-    pt_check(integrate(power_of, &p, 0, 100, PT_SAMPLER_SOBOL, 0, &e) == PT_ERROR_ARGUMENT,
-             "0 dimensions", "accepted");
-    pt_check(integrate(power_of, &p, 65, 100, PT_SAMPLER_SOBOL, 0, &e) == PT_ERROR_ARGUMENT,
-             "65 dimensions", "accepted");
+    pt_check(integrate(power_of, &p, 0, 100, PT_SAMPLER_SOBOL, 0, &e) == PT_ERROR_ARGUMENT, "0 dimensions",
+             "accepted");
+    pt_check(integrate(power_of, &p, 65, 100, PT_SAMPLER_SOBOL, 0, &e) == PT_ERROR_ARGUMENT, "65 dimensions",
+             "accepted");
     pt_check(integrate(power_of, &p, 1, 31, PT_SAMPLER_SOBOL, 0, &e) == PT_ERROR_ARGUMENT, "31 points",
              "accepted");
-    pt_check(integrate(power_of, &p, 64, 32, PT_SAMPLER_SOBOL, 0, &e) == PT_OK,
-             "64 dimensions, 32 points", "refused");
+    pt_check(integrate(power_of, &p, 64, 32, PT_SAMPLER_SOBOL, 0, &e) == PT_OK, "64 dimensions, 32 points",
+             "refused");
+}
+
+/* The other estimators: their means, and their variances where these are known in closed form. Techniques
+   draw from the density (k + 1) x^k. */
+static void power_warp(const double *u, double *x, void *user)
+{
+    x[0] = pow(1 - u[0], 1 / (*(const double *)user + 1));
+}
+static double power_density(const double *x, void *user)
+{
+    const double k = *(const double *)user;
+    return (k + 1) * pow(x[0], k);
+}
+static double sum_of_two(const double *u, void *user)
+{
+    (void)user;
+    return u[0] + u[1];
+}
+static double first(const double *u, void *user)
+{
+    (void)user;
+    return u[0];
+}
+
+typedef enum estimator {
+    ANTITHETIC,
+    ANTITHETIC_ODD,
+    IMPORTANCE,
+    IMPORTANCE_PERFECT,
+    CONTROL,
+    BALANCE,
+    POWER,
+    MAXIMUM,
+    ONE_SAMPLE,
+    ROULETTE,
+    SPLITTING,
+    ESTIMATORS
+} estimator;
+
+typedef struct estimator_case {
+    const char *name;
+    double power, exact, variance, calls; /* variance < 0: not known; calls of f for each value */
+} estimator_case;
+
+static const estimator_case estimator_cases[ESTIMATORS] = {
+    {"antithetic, x^2", 2, 1.0 / 3, 1.0 / 180, 2},
+    {"antithetic, x", 1, 1.0 / 2, 0, 2},
+    {"importance 2x, x^2", 2, 1.0 / 3, 1.0 / 72, 1},
+    {"importance 3x^2, x^2", 2, 1.0 / 3, 0, 1},
+    {"control x, x^2", 2, 1.0 / 3, 1.0 / 180, 1},
+    {"balance heuristic 1 and 2x, x^2", 2, 1.0 / 3, 0.018721058606716604, 2},
+    {"power heuristic 1 and 2x, x^2", 2, 1.0 / 3, 0.018175986775525456, 2},
+    {"maximum heuristic 1 and 2x, x^2", 2, 1.0 / 3, -1, 2},
+    {"one sample of 1 or 2x, x^2", 2, 1.0 / 3, 0.040885490263979078, 1},
+    {"roulette 1/2, x", 1, 1.0 / 2, 2.0 / 3 - 1.0 / 4, 0.5},
+    {"splitting, x + 4 times y", 0, 1, 1.0 / 12 + 1.0 / 48, 4}};
+
+static pt_result run_estimator(estimator k, const pt_integral *p, pt_estimate *e)
+{
+    static const double half[2] = {0.5, 0.5};
+    static const int once[2] = {1, 1};
+    double none = 0, linear = 1, square = 2;
+    pt_technique t[3];
+    int i;
+    for (i = 0; i < 3; i++) {
+        t[i].warp = power_warp;
+        t[i].density = power_density;
+        t[i].user = i == 0 ? &none : i == 1 ? &linear : &square;
+    }
+    switch (k) {
+    case IMPORTANCE:
+        return pt_estimate_importance(p, &t[1], e);
+    case IMPORTANCE_PERFECT:
+        return pt_estimate_importance(p, &t[2], e);
+    case CONTROL:
+        return pt_estimate_control(p, first, 0.5, 1, e);
+    case BALANCE:
+        return pt_estimate_mis(p, t, once, 2, PT_HEURISTIC_BALANCE, e);
+    case POWER:
+        return pt_estimate_mis(p, t, once, 2, PT_HEURISTIC_POWER, e);
+    case MAXIMUM:
+        return pt_estimate_mis(p, t, once, 2, PT_HEURISTIC_MAXIMUM, e);
+    case ONE_SAMPLE:
+        return pt_estimate_mis_one(p, t, half, 2, PT_HEURISTIC_BALANCE, e);
+    case ROULETTE:
+        return pt_estimate_roulette(p, 0.5, e);
+    case SPLITTING:
+        return pt_estimate_splitting(p, 1, 4, e);
+    default:
+        return pt_estimate_antithetic(p, e);
+    }
+}
+
+static void one_estimator(estimator k, pt_sampler_kind kind, uint64_t seed)
+{
+    const estimator_case *const c = &estimator_cases[k];
+    const int runs = 64;
+    double power = c->power, calls = 0;
+    pt_integral p = {power_of, NULL, 1, 0, PT_SAMPLER_SOBOL, 0};
+    pt_stats value = PT_STATS_INIT, variance = PT_STATS_INIT;
+    int i, refused = 0;
+    p.f = k == SPLITTING ? sum_of_two : power_of;
+    p.user = &power;
+    p.dimensions = k == SPLITTING ? 2 : 1;
+    p.n = pt_test_samples(16384);
+    p.sampler = kind;
+    for (i = 0; i < runs; i++) {
+        pt_estimate e;
+        p.seed = pt_test_seed(seed + (uint64_t)i);
+        refused += run_estimator(k, &p, &e) != PT_OK;
+        pt_stats_add(&value, e.value);
+        pt_stats_add(&variance, e.standard_error * e.standard_error * p.n);
+        calls += e.evaluations / p.n / runs;
+    }
+    pt_check(refused == 0, c->name, "refused");
+    pt_check_mean(c->name, &value, c->exact, 1e-12, 0.02, PT_TEST_MEANS, "the estimator is biased");
+    pt_check_near(c->name, calls, c->calls, k == ROULETTE ? 0.01 : 0,
+                  "calls of the integrand for each value");
+    if (kind == PT_SAMPLER_INDEPENDENT && c->variance >= 0)
+        pt_check_mean(c->name, &variance, c->variance, 1e-20, 0.05, PT_TEST_MEANS,
+                      "not the variance it should have");
+}
+
+static void other_estimators(void)
+{
+    int k, s;
+    for (k = 0; k < ESTIMATORS; k++)
+        for (s = 0; s < 3; s++) one_estimator((estimator)k, kinds[s], (uint64_t)(4000 + 100 * (3 * k + s)));
+}
+
+static void other_estimators_refuse(void)
+{
+    static const double shares[2] = {0.5, 0.4};
+    static const int none[2] = {0, 0};
+    double one = 1;
+    const pt_technique t = {power_warp, power_density, &one};
+    const pt_technique both[2] = {{power_warp, power_density, &one}, {power_warp, power_density, &one}};
+    const pt_integral p = {power_of, &one, 1, 100, PT_SAMPLER_INDEPENDENT, 0};
+    const pt_result no = PT_ERROR_ARGUMENT;
+    pt_estimate e;
+    pt_check(pt_estimate_roulette(&p, 0, &e) == no && pt_estimate_roulette(&p, 1.5, &e) == no, "roulette",
+             "q outside (0,1]");
+    pt_check(pt_estimate_splitting(&p, 1, 4, &e) == no && pt_estimate_splitting(&p, 0, 4, &e) == no,
+             "splitting", "nothing to split");
+    pt_check(pt_estimate_importance(&p, NULL, &e) == no, "importance", "no technique");
+    pt_check(pt_estimate_mis(&p, both, none, 2, PT_HEURISTIC_POWER, &e) == no, "several techniques",
+             "no samples");
+    pt_check(pt_estimate_mis_one(&p, both, shares, 2, PT_HEURISTIC_POWER, &e) == no,
+             "one of several techniques", "shares that do not add up to 1");
+    pt_check(pt_estimate_control(&p, NULL, 0, 1, &e) == no, "control variate", "no control");
+    pt_check(pt_estimate_control(&p, first, HUGE_VAL, 1, &e) == no, "control variate", "infinite integral");
+    pt_check(pt_estimate_importance(&p, &t, &e) == PT_OK && fabs(e.value - 0.5) < 1e-12 &&
+                 e.standard_error < 1e-12,
+             "perfect importance sampling", "%g +- %g", e.value, e.standard_error);
 }
 
 /* Jittered sampling has exact variances: 1/(12 N^3) for x in N strata, 1/(6 N^2) for x + y in N cells. */
@@ -1501,6 +1662,8 @@ int main(int argc, char **argv)
     PT_TEST(estimates);
     PT_TEST_EXACT(spread_points_pay);
     PT_TEST_EXACT(estimates_refuse);
+    PT_TEST(other_estimators);
+    PT_TEST_EXACT(other_estimators_refuse);
     PT_TEST(jittered_variance);
     PT_TEST_EXACT(mis_weights);
     PT_TEST(mis_of_powers);

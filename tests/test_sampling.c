@@ -578,8 +578,9 @@ static void fresnel_of_diffuse_light(void)
         pt_stats s = PT_STATS_INIT;
         for (i = 0; i < 64; i++) {
             pt_estimate e;
-            integrate(fresnel_integrand, &eta, 1, pt_test_samples(4096), PT_SAMPLER_STRATIFIED,
-                             pt_test_seed((uint64_t)(200 + i)), &e);
+            const pt_integral p = {fresnel_integrand, &eta, 1, pt_test_samples(4096), PT_SAMPLER_STRATIFIED,
+                                   pt_test_seed((uint64_t)(200 + i))};
+            pt_estimate_mean(&p, &e);
             pt_stats_add(&s, e.value);
         }
         pt_check_mean("reflectance for diffuse light", &s, exact[inside], 5e-10, 0.005, PT_TEST_MEANS,

@@ -359,7 +359,7 @@ static void furnace_scales(void)
         for (j = 0; j < 3; j++) scale_of_furnace(radius[i], away[j]);
 }
 
-/* ---- lossless objects cannot be seen where radiance is the same everywhere --------------------------- */
+/* ---- lossless objects cannot be seen where radiance is the same everywhere -------------------------- */
 
 enum { GLASS_BALL, MIRROR_BALL, GLASS_IN_GLASS, MIRROR_IN_GLASS, GLASS_PLATE, GLASS_CUBE };
 
@@ -412,8 +412,8 @@ static pt_ray ray_at_object(pt_sampler *sampler)
     return ray_from(from, pt_v3_sub(pt_v3_scale(on, pt_sampler_1d(sampler)), from));
 }
 
-/* Every path has radiance 1 up to the rounding of its weights, less than eight an edge. With the default roulette
-   too: its survival is the throughput without the factor eta^2, that is 1, cut to 1 - 2^-24. */
+/* Every path has radiance 1 up to the rounding of its weights, less than eight an edge. With the default
+   roulette too: its survival is the throughput without the factor eta^2, that is 1, cut to 1 - 2^-24. */
 static int paths_off_one(experiment *e, uint64_t seed, uint32_t n, double *worst)
 {
     pt_sampler sampler = pt_sampler_make(PT_SAMPLER_INDEPENDENT, pt_test_seed(seed), 0);
@@ -616,6 +616,24 @@ static void pools(void)
         if (w == 0) check_pool(name[w], &scene, water[w], 45, LIGHT, 0, seed + 6);
         pt_scene_free(&scene);
     }
+}
+
+/* The direction of a ray need not have unit length, a camera's neither. */
+static void length_of_rays(void)
+{
+    static const double length[2] = {7, 1e-3};
+    pt_scene scene = pool(0, 1, 0, 1.33);
+    int i;
+    for (i = 0; i < 2; i++) {
+        experiment e = experiment_of(&scene, pool_ray(75), PATH);
+        const double exact = pool_radiance(&e.ray, 0, 1, 0, 1.33);
+        pt_stats s[3];
+        e.ray.d = pt_v3_scale(e.ray.d, (pt_real)length[i]);
+        by_means(&e, 290 + (uint64_t)i, 256, s);
+        pt_check_mean(label("lamp under water, direction of length %g", length[i]), &s[0], exact, 1e-6, 0.005,
+                      PT_TEST_MEANS, "the direction must be normalised before cosines are taken of it");
+    }
+    pt_scene_free(&scene);
 }
 
 /* The closed form itself against values from quadrature: n = 1.33, rho = 0.5 at 0, 45 and 75 degrees, and n =
@@ -904,9 +922,10 @@ static void direct_disk(void)
         pt_stats s = PT_STATS_INIT;
         disk_light disk = light[i];
         for (k = 0; k < UNITS; k++) {
+            const pt_integral integral = {disk_integrand, &disk, 2, pt_test_samples(512), PT_SAMPLER_SOBOL,
+                                          pt_test_seed(480 + UNITS * (uint64_t)i + (uint64_t)k)};
             pt_estimate estimate;
-            integrate(disk_integrand, &disk, 2, pt_test_samples(512), PT_SAMPLER_SOBOL,
-                             pt_test_seed(480 + UNITS * (uint64_t)i + (uint64_t)k), &estimate);
+            pt_estimate_mean(&integral, &estimate);
             pt_stats_add(&s, estimate.value);
         }
         pt_check_mean(label("disk of radius %g at (%g, %g)", r, o, h), &s, exact, 1e-6 * exact, 0.005,
@@ -1426,21 +1445,26 @@ static void agreement_glass_ball(void)
     pt_scene_free(&scene);
 }
 
-/* The two heuristics weigh differently and have the same mean. */
+/* The heuristics weigh differently and have the same mean. */
 static void heuristics(void)
 {
-    const pt_camera inside = pt_camera_look_at(v3(0.3, 1.3, 0.9), v3(-0.1, 0.5, -0.3), v3(0, 1, 0), 75);
+    static const char *const name[3] = {"power", "balance", "maximum"};
+    const pt_camera inside =
+        pt_camera_look_at(v3(0.3, 1.3, 0.9), v3(-0.1, 0.5, -0.3), v3(0, 1, 0), 75);
     pt_scene scene = room();
-    pt_stats power[3], balance[3];
+    pt_stats s[3][3];
     pt_li_options options;
+    int k;
     memset(&options, 0, sizeof options);
-    options.max_edges = 6;
+    options.max_edges = 4;
     options.roulette = PT_ROULETTE_NONE;
-    picture_means(&scene, &inside, &options, PATH, 1050, 1024, tally_reflected, power);
-    options.heuristic = PT_HEURISTIC_BALANCE;
-    picture_means(&scene, &inside, &options, PATH, 1051, 1024, tally_reflected, balance);
-    pt_check_equal_means("power = balance heuristic", &power[0], &balance[0], 0.02,
-                         "the weights of the techniques do not sum to 1");
+    for (k = 0; k < 3; k++) {
+        options.heuristic = (pt_heuristic)k;
+        picture_means(&scene, &inside, &options, PATH, 1050 + (uint64_t)k, 768, tally_reflected, s[k]);
+    }
+    for (k = 1; k < 3; k++)
+        pt_check_equal_means(label("power = %s heuristic", name[k]), &s[0][1], &s[k][1], 0.02,
+                             "the weights of the techniques do not sum to 1");
     pt_scene_free(&scene);
 }
 
@@ -1854,6 +1878,7 @@ int main(int argc, char **argv)
     PT_TEST(white_ball);
     PT_TEST_EXACT(pool_closed_form);
     PT_TEST(pools);
+    PT_TEST(length_of_rays);
     PT_TEST_EXACT(white_pool);
     PT_TEST(glass_plate);
     PT_TEST_EXACT(glowing_mirrors);
