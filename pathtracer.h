@@ -122,6 +122,7 @@
        [Duf17] Duff et al.: Building an Orthonormal Basis, Revisited, JCGT 6(1), 2017
        [Hai19] Haines, Guenther, Akenine-Moeller: Precision Improvements for Ray/Sphere Intersection,
                Ray Tracing Gems ch. 7, 2019
+       [How10] Howell: A Catalog of Radiation Heat Transfer Configuration Factors, 3rd edition, 2010
        [Ize13] Ize: Robust BVH Ray Traversal, JCGT 2(2), 2013
        [Joe08] Joe, Kuo: Constructing Sobol Sequences with Better Two-Dimensional Projections, 2008
        [Kaj86] Kajiya: The Rendering Equation, 1986
@@ -132,6 +133,7 @@
        [Oos83] Van Oosterom, Strackee: The Solid Angle of a Plane Triangle, 1983
        [PBR]   Pharr, Jakob, Humphreys: Physically Based Rendering, 4th edition, 2023
        [Shi97] Shirley, Chiu: A Low Distortion Map Between Disk and Square, 1997
+       [Sny96] Snyder: Area Light Sources for Real-Time Graphics, 1996
        [Ste11] Stafford: Better Bit Mixing, 2011 (finaliser used by Java's SplittableRandom)
        [Ure13] Urena, Fajardo, King: An Area-Preserving Parametrization for Spherical Rectangles, 2013
        [Vea97] Veach: Robust Monte Carlo Methods for Light Transport Simulation, 1997
@@ -631,21 +633,53 @@ PTDEF void pt_alias_free(pt_alias *table, void *alloc_user);
    [PT-05] RADIOMETRY: declarations
    ===================================================================================================== */
 
-/* Solid angle in sr of a cap of half angle theta in [0, pi], and of a triangle seen from p [Oos83]. */
+/* Lumens per watt at 555 nm, where the eye sees best (K_m of the SI; 683.002 for the tabulated V). A photometric
+   quantity is the radiometric one weighted by 683 V(lambda): flux W - lm, intensity W/sr - cd, irradiance W/m^2
+   - lx, radiance W/(sr m^2) - cd/m^2; the functions below serve both. */
+#define PT_LUMENS_PER_WATT 683.002
+
+/* Flux (W or lm) of a point source of the same intensity in all directions, a Lambertian surface's exitance
+   pi L, and the power of a spot of intensity I whose falloff is a smoothstep in the cosine, from 1 at cos_start
+   to 0 at cos_end < cos_start. */
+PTDEF double pt_flux_point(double intensity);
+PTDEF double pt_exitance(double radiance);
+PTDEF double pt_flux_spot(double intensity, double cos_start, double cos_end);
+
+/* Solid angle in sr of a cap of half angle theta in [0, pi]; of a triangle seen from p [Oos83]; of a rectangle
+   corner + s e1 + t e2 (e1, e2 perpendicular); of a simple flat polygon of count >= 3 corners; of a disk of
+   radius r > 0 in a plane at distance h > 0, its centre `offset` aside of the foot of p. */
 PTDEF double pt_solid_angle_cap(double theta);
 PTDEF double pt_solid_angle_triangle(pt_vec3 p, pt_vec3 v0, pt_vec3 v1, pt_vec3 v2);
+PTDEF double pt_solid_angle_rectangle(pt_vec3 p, pt_vec3 corner, pt_vec3 e1, pt_vec3 e2);
+PTDEF double pt_solid_angle_polygon(pt_vec3 p, const pt_vec3 *v, int count);
+PTDEF double pt_solid_angle_disk(double r, double h, double offset);
 
 /* Irradiance in W/m^2 at distance d from a point source of radiant intensity I W/sr; cos_theta at the
-   receiver. */
+   receiver (0 below the horizon). For a spot, multiply by pt_spot_falloff. */
 PTDEF double pt_irradiance_point(double intensity, double d, double cos_theta);
+PTDEF double pt_spot_falloff(double cos_axis, double cos_start, double cos_end);
 /* ... from a sphere of radius r and uniform radiance L whose centre is at distance d > r in a direction with
-   cosine cos_theta; the whole sphere must be above the receiver's horizon. */
+   cosine cos_theta; what is below the receiver's horizon does not count. */
 PTDEF double pt_irradiance_sphere(double radiance, double r, double d, double cos_theta);
-/* ... on the axis of a facing disk of radius r at distance h, receiver parallel to it. */
-PTDEF double pt_irradiance_disk(double radiance, double r, double h);
+/* ... from a disk of radius r in a plane parallel to the receiver at distance h > 0, its centre `offset` aside. */
+PTDEF double pt_irradiance_disk(double radiance, double r, double h, double offset);
 /* ... at p with normal n from a polygon of uniform radiance, by Lambert's formula [Lam60], the part below the
    horizon cut off. Both sides of the polygon count as emitting. count in [3, 32]. */
 PTDEF double pt_irradiance_polygon(double radiance, pt_vec3 p, pt_vec3 n, const pt_vec3 *v, int count);
+
+/* Form factors F_12: the fraction of the flux that leaves 1 (uniform, diffuse) and reaches 2 [How10]. All
+   lengths > 0. Opposed rectangles a x b at distance c; rectangles w x l and h x l at right angles on the common
+   edge l; coaxial disks r1 and r2 at distance h; a sphere and a coaxial disk of radius r, its plane at h from
+   the sphere's centre. */
+PTDEF double pt_form_factor_parallel(double a, double b, double c);
+PTDEF double pt_form_factor_perpendicular(double w, double h, double l);
+PTDEF double pt_form_factor_disks(double r1, double r2, double h);
+PTDEF double pt_form_factor_sphere_disk(double r, double h);
+
+/* Spectral radiance of a black body at a wavelength in nm, W sr^-1 m^-2 nm^-1, by Planck's law with the SI's
+   constants; and its luminous efficacy in lm/W (12.4 at 2700 K: an incandescent lamp). T > 0 in K. */
+PTDEF double pt_blackbody(double nm, double kelvin);
+PTDEF double pt_blackbody_efficacy(double kelvin);
 
 /* A spectrum as a table: value[i] at wavelength nm[i], rising; linear in between. */
 typedef struct pt_spectrum {
@@ -2822,6 +2856,28 @@ PTDEF void pt_alias_free(pt_alias *table, void *alloc_user)
    is what a ray carries, the same at both its ends. E = int L cos domega over the hemisphere; the closed forms
    below are that integral for simple lights, and the tests hold the samplers against them. */
 
+PTDEF double pt_flux_point(double intensity)
+{
+    return 4 * PT_PI * intensity;
+}
+
+PTDEF double pt_exitance(double radiance)
+{
+    return PT_PI * radiance; /* int L cos over the hemisphere */
+}
+
+PTDEF double pt_flux_spot(double intensity, double cos_start, double cos_end)
+{
+    /* 2 pi int I falloff dcos; a smoothstep has the mean 1/2 */
+    return 2 * PT_PI * intensity * (1 - 0.5 * (cos_start + cos_end));
+}
+
+PTDEF double pt_spot_falloff(double cos_axis, double cos_start, double cos_end)
+{
+    double x = fmax(0, fmin(1, (cos_axis - cos_end) / (cos_start - cos_end)));
+    return x * x * (3 - 2 * x);
+}
+
 PTDEF double pt_solid_angle_cap(double theta)
 {
     double s = sin(theta / 2);
@@ -2834,6 +2890,44 @@ PTDEF double pt_solid_angle_triangle(pt_vec3 p, pt_vec3 v0, pt_vec3 v1, pt_vec3 
     return pt_spherical_triangle_make(&s, p, v0, v1, v2);
 }
 
+PTDEF double pt_solid_angle_rectangle(pt_vec3 p, pt_vec3 corner, pt_vec3 e1, pt_vec3 e2)
+{
+    pt_spherical_rectangle s;
+    return pt_spherical_rectangle_make(&s, p, corner, e1, e2);
+}
+
+PTDEF double pt_solid_angle_polygon(pt_vec3 p, const pt_vec3 *v, int count)
+{
+    /* A fan of triangles from v[0], each with the sign of its winding as seen from p. */
+    double sum = 0;
+    int i;
+    for (i = 1; i + 1 < count; i++) {
+        pti_d3 a = pti_d_between(p, v[0]), n = pti_d_cross(pti_d_between(v[0], v[i]), pti_d_between(v[0], v[i + 1]));
+        sum += copysign(pt_solid_angle_triangle(p, v[0], v[i], v[i + 1]), pti_d_dot(a, n));
+    }
+    return fabs(sum);
+}
+
+PTDEF double pt_solid_angle_disk(double r, double h, double offset)
+{
+    /* int (1 - cos theta) dphi along the rim, phi around the foot of p. With the rim at angle psi of the disk,
+       rho^2 = o^2 + r^2 + 2 o r cos psi, s = sqrt(h^2 + rho^2):  dphi = (r^2 + o r cos psi)/rho^2 dpsi and
+       (1 - h/s)/rho^2 = 1/(s (s + h)). The integrand is smooth and periodic: the trapezoidal rule converges
+       faster than any power; it is doubled until it stands still. */
+    double sum = 0, last = -1, value = 0;
+    uint32_t n, i;
+    for (n = 8; n <= 1u << 20; n *= 2) {
+        for (i = (n == 8 ? 0 : 1); i < n; i += (n == 8 ? 1 : 2)) {
+            double c = cos(2 * PT_PI * i / n), s = sqrt(h * h + offset * offset + r * r + 2 * offset * r * c);
+            sum += (r * r + offset * r * c) / (s * (s + h));
+        }
+        value = 2 * PT_PI * sum / n;
+        if (fabs(value - last) <= 4 * PTI_2_M53 * value) break;
+        last = value;
+    }
+    return value;
+}
+
 PTDEF double pt_irradiance_point(double intensity, double d, double cos_theta)
 {
     return intensity * fmax(0, cos_theta) / (d * d);
@@ -2841,12 +2935,56 @@ PTDEF double pt_irradiance_point(double intensity, double d, double cos_theta)
 
 PTDEF double pt_irradiance_sphere(double radiance, double r, double d, double cos_theta)
 {
-    return PT_PI * radiance * (r / d) * (r / d) * cos_theta;
+    /* Above the horizon pi L s^2 cos, s = r/d. Cut by the horizon (|cos| < s): [Sny96]. */
+    double s = r / d, c = cos_theta, x, y, w;
+    if (c >= s) return PT_PI * radiance * s * s * c;
+    if (c <= -s) return 0;
+    x = sqrt((1 - s) * (1 + s)) / s;
+    y = -x * c / sqrt((1 - c) * (1 + c));
+    w = sqrt((1 - c) * (1 + c) * fmax(0, (1 - y) * (1 + y)));
+    return radiance * ((c * acos(fmax(-1, fmin(1, y))) - x * w) * s * s + atan2(w, x));
 }
 
-PTDEF double pt_irradiance_disk(double radiance, double r, double h)
+PTDEF double pt_irradiance_disk(double radiance, double r, double h, double offset)
 {
-    return PT_PI * radiance * r * r / (r * r + h * h);
+    double a = h * h + offset * offset, b = a + r * r, root = sqrt(b * b - 4 * offset * offset * r * r);
+    /* pi L / 2 (1 - (a - r^2)/root), the difference multiplied out where it would cancel */
+    if (a < r * r) return 0.5 * PT_PI * radiance * (1 + (r * r - a) / root);
+    return 2 * PT_PI * radiance * r * r * h * h / (root * (root + a - r * r));
+}
+
+PTDEF double pt_form_factor_parallel(double a, double b, double c)
+{
+    double x = a / c, y = b / c, x1 = sqrt(1 + x * x), y1 = sqrt(1 + y * y);
+    return 2 / (PT_PI * x * y) * (log(x1 * y1 / sqrt(1 + x * x + y * y)) + x * y1 * atan(x / y1) + y * x1 * atan(y / x1) -
+                                  x * atan(x) - y * atan(y));
+}
+
+PTDEF double pt_form_factor_perpendicular(double w, double h, double l)
+{
+    double x = w / l, y = h / l, x2 = x * x, y2 = y * y, d = sqrt(x2 + y2), all = 1 + x2 + y2;
+    double logs = log((1 + x2) * (1 + y2) / all) + x2 * log(x2 * all / ((1 + x2) * (x2 + y2))) +
+                  y2 * log(y2 * all / ((1 + y2) * (x2 + y2)));
+    return (x * atan(1 / x) + y * atan(1 / y) - d * atan(1 / d) + 0.25 * logs) / (PT_PI * x);
+}
+
+PTDEF double pt_form_factor_disks(double r1, double r2, double h)
+{
+    double x = 1 + (h * h + r2 * r2) / (r1 * r1), q = 2 * r2 / r1;
+    return 0.5 * q * q / (x + sqrt((x - q) * (x + q))); /* (x - sqrt(x^2 - q^2)) / 2 */
+}
+
+PTDEF double pt_form_factor_sphere_disk(double r, double h)
+{
+    double s = sqrt(h * h + r * r);
+    return 0.5 * r * r / (s * (s + h)); /* (1 - h/s) / 2 */
+}
+
+PTDEF double pt_blackbody(double nm, double kelvin)
+{
+    const double h = 6.62607015e-34, c = 299792458, k = 1.380649e-23; /* exact by definition of the SI */
+    double lambda = nm * 1e-9;
+    return 2 * h * c * c / (lambda * lambda * lambda * lambda * lambda) / expm1(h * c / (lambda * k * kelvin)) * 1e-9;
 }
 
 /* The part of a polygon with n . v > 0 (v relative to the receiver); out has room for 2 * count corners (a
@@ -2969,6 +3107,18 @@ PTDEF double pt_cie_d65(double nm)
     if (!(nm >= 360 && nm <= 830)) return 0;
     i = x < PTI_CIE_COUNT - 2 ? (int)x : PTI_CIE_COUNT - 2;
     return pti_cie[i][3] + (x - i) * (pti_cie[i + 1][3] - pti_cie[i][3]); /* linear by definition */
+}
+
+PTDEF double pt_blackbody_efficacy(double kelvin)
+{
+    /* 683 int B V / (sigma T^4 / pi), sigma = 2 pi^5 k^4 / (15 h^3 c^2) */
+    double sum = 0, bar[3], t2 = kelvin * kelvin;
+    int nm;
+    for (nm = 360; nm <= 830; nm++) {
+        pt_cie_xyz(nm, bar);
+        sum += bar[1] * pt_blackbody(nm, kelvin);
+    }
+    return PT_LUMENS_PER_WATT * sum / (5.670374419184429e-8 * t2 * t2 / PT_PI);
 }
 
 PTDEF pt_rgbd pt_xyz_to_rgb(const double xyz[3])

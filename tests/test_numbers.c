@@ -1089,7 +1089,7 @@ static void irradiance_of_simple_lights(void)
     near_relative("sphere aslant", pt_irradiance_sphere(1, 1, 2, cos(PT_PI / 4)), 0.55536036726979578, 1e-15);
     near_relative("small far sphere", pt_irradiance_sphere(1e9, 1e-4, 1, 1), 10 * PT_PI, 1e-14);
     for (i = 0; i < 3; i++)
-        near_relative("disk", pt_irradiance_disk(1, disk[i][0], disk[i][1]), disk[i][2], 1e-14);
+        near_relative("disk", pt_irradiance_disk(1, disk[i][0], disk[i][1], 0), disk[i][2], 1e-14);
 }
 
 typedef struct polygon {
@@ -1205,7 +1205,7 @@ static void irradiance_of_rectangles(void)
         else
             near_relative("polygon of 32 sides is nearly a disk",
                           pt_irradiance_polygon(1, pt_v3(0, 0, 0), pt_v3(0, 0, 1), v, sides),
-                          pt_irradiance_disk(1, 1, 1), 0.006);
+                          pt_irradiance_disk(1, 1, 1, 0), 0.006);
     }
 }
 
