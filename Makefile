@@ -25,7 +25,7 @@ BUILD_CXX = $(CXX) $(FIXED_CXX) $(WARN) $(CXXFLAGS) $(EXTRA) -I. -pthread $(LDFL
 
 # The picture that plain `make` renders.
 SCENE = cornell
-SIZE = 400x400
+SIZE = 360x360
 SPP = 64
 
 SHARES = $(shell k=1; while [ $$k -le $(JOBS) ]; do echo $$k; k=$$((k + 1)); done)

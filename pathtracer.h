@@ -1191,7 +1191,8 @@ typedef struct pt_li_info {
     pt_real depth;
 } pt_li_info;
 
-/* Estimates the radiance that arrives along a ray. The one signature of every camera-path method. */
+/* Estimates the radiance that arrives along a ray, from however far (tmax and the length of d do not matter).
+   The one signature of every camera-path method. */
 typedef pt_rgbd (*pt_li_fn)(const pt_scene *scene, const pt_ray *ray, pt_sampler *sampler,
                             const pt_li_options *options, pt_li_info *info);
 
@@ -5429,6 +5430,8 @@ PTI_INLINE pt_rgbd pti_path(const pt_scene *scene, const pt_ray *ray, pt_sampler
     w.sampler = sampler;
     w.options = options;
     w.ray = *ray;
+    w.ray.d = pt_v3_normalize(ray->d); /* its negative is wo, whose cosines must be cosines */
+    w.ray.tmax = PTI_REAL_MAX;
     w.beta = pt_rgbd3(1, 1, 1);
     w.eta2 = 1;
     w.sum = pt_rgbd3(0, 0, 0);

@@ -299,29 +299,30 @@ static const char *split_test(const char *test, char *program)
     return test + n;
 }
 
-/* Does the test pass on the header as it is, and does it check anything? Otherwise what it catches says
-   nothing. */
-static int is_sound(runner *r, const char *test)
+/* A test that fails on the header as it is, or checks nothing, says nothing about a mutant: what is wrong
+   with it, NULL if nothing is. */
+static const char *what_is_unsound(runner *r, const char *test)
 {
     char program[MAX_NAME], dir[64], path[256], *log;
     const char *filter = split_test(test, program);
     FILE *made;
-    int i, good;
+    int i, empty;
 
     for (i = 0; i < r->sound_count; i++)
-        if (strcmp(r->sound[i], test) == 0) return 1;
+        if (strcmp(r->sound[i], test) == 0) return NULL;
     name(dir, sizeof dir, DIR "/unchanged%d", r->share); /* has no header in it: the project's is found */
     name(path, sizeof path, "%s/%s", dir, program);
     made = fopen(path, "rb");
     if (made) fclose(made);
-    if (!made && !compile(dir, program)) return 0;
-    if (run(dir, program, filter) != 0) return 0;
+    if (!made && !compile(dir, program)) return "does not compile with the header as it is";
+    if (run(dir, program, filter) != 0) return "fails on the header as it is";
     name(path, sizeof path, "%s/run.log", dir);
     log = read_file(path);
-    good = log && !strstr(log, ": 0 passed");
+    empty = !log || strstr(log, ": 0 passed") != NULL;
     free(log);
-    if (good && r->sound_count < MAX_MUTANTS) strcpy(r->sound[r->sound_count++], test);
-    return good;
+    if (empty) return "checks nothing";
+    if (r->sound_count < MAX_MUTANTS) strcpy(r->sound[r->sound_count++], test);
+    return NULL;
 }
 
 /* ---- one mutant -------------------------------------------------------------------------------------- */
@@ -333,12 +334,12 @@ typedef enum verdict { CAUGHT, NOT_CAUGHT, INVALID } verdict;
 static verdict try_test(runner *r, const mutant *m, const char *test, char *text, size_t size)
 {
     char dir[128], program[MAX_NAME];
-    const char *filter = split_test(test, program);
+    const char *filter = split_test(test, program), *unsound = what_is_unsound(r, test);
     int status;
 
     name(dir, sizeof dir, DIR "/%s", m->name);
-    if (!is_sound(r, test)) {
-        name(text, size, "%.100s does not pass on the header as it is, or checks nothing", test);
+    if (unsound) {
+        name(text, size, "%s %s", test, unsound);
         return INVALID;
     }
     if (!compile(dir, program)) {

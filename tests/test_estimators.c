@@ -65,7 +65,8 @@ static const row *find_row(const char *table, const char *quantity, const char *
 {
     const row *r;
     int at = 0;
-    while ((r = next_row(table, quantity, &at)) != NULL && strcmp(r->params, params) != 0) {}
+    while ((r = next_row(table, quantity, &at)) != NULL && strcmp(r->params, params) != 0) {
+    }
     pt_check(r != NULL, "exact values", "no row %s %s %s", table, quantity, params);
     return r ? r : &rows[0];
 }
@@ -196,7 +197,8 @@ static void power_warp(const double *u, double *x, void *user)
 {
     const power_law *const law = (const power_law *)user;
     int d;
-    for (d = 0; d < law->dimensions; d++) x[d] = law->q > 0 || law->q < 0 ? pow(u[d], 1 / (law->q + 1)) : u[d];
+    for (d = 0; d < law->dimensions; d++)
+        x[d] = law->q > 0 || law->q < 0 ? pow(u[d], 1 / (law->q + 1)) : u[d];
 }
 static double power_density(const double *x, void *user)
 {
@@ -229,22 +231,23 @@ typedef struct job {
     const char *name;
     how how;
     pt_integrand f;
-    double a[3];             /* parameters of f                                        */
-    int dimensions;
-    power_law law[2];        /* IMPORTANCE: the first; MIS, MIS_ONE: both              */
-    int counts[2];           /* MIS                                                    */
-    double shares[2];        /* MIS_ONE                                                */
-    pt_heuristic heuristic;
-    pt_integrand g;          /* CONTROL                                                */
-    double g_integral, c, q; /* q: ROULETTE                                            */
-    int outer, splits;       /* SPLITTING                                              */
-    double exact;            /* the integral                                           */
+    double a[3];             /* parameters of f                        */
+    int dimensions;          /* of f                                   */
+    power_law law[2];        /* IMPORTANCE: the first; MIS: both       */
+    int counts[2];           /* MIS                                    */
+    double shares[2];        /* MIS_ONE                                */
+    pt_heuristic heuristic;  /* MIS, MIS_ONE                           */
+    pt_integrand g;          /* CONTROL                                */
+    double g_integral, c, q; /* CONTROL, but q: ROULETTE               */
+    int outer, splits;       /* SPLITTING                              */
+    double exact;            /* the integral                           */
 } job;
 
 static pt_result run(const job *original, uint32_t n, pt_sampler_kind kind, uint64_t seed, pt_estimate *out)
 {
     job j = *original;
-    const pt_technique t[2] = {{power_warp, power_density, &j.law[0]}, {power_warp, power_density, &j.law[1]}};
+    const pt_technique t[2] = {{power_warp, power_density, &j.law[0]},
+                               {power_warp, power_density, &j.law[1]}};
     const pt_integral p = {j.f, j.a, j.dimensions, n, kind, pt_test_seed(seed)};
     switch (j.how) {
     case MEAN: return pt_estimate_mean(&p, out);
@@ -296,8 +299,8 @@ static int is_rare(const row *r)
     return strcmp(r->params, "c=0.7;s=0.001") == 0 || strcmp(r->params, "a=0.001") == 0;
 }
 
-/* Where f takes two values, each half of the time, (f - I)^2 is constant and the variance hardly scatters: what
-   is left is the square of the error of the mean, which is not normal. Far wider than that: */
+/* Where f takes two values, each half of the time, (f - I)^2 is constant and the variance hardly scatters:
+   what is left is the square of the error of the mean, which is not normal. The tolerance is far wider. */
 static int is_even_chance(double mean, double variance)
 {
     return fabs(variance - mean * (1 - mean)) < 1e-9 && fabs(mean - 0.5) < 0.05;
@@ -305,8 +308,10 @@ static int is_even_chance(double mean, double variance)
 static void check_variance(const char *name, const pt_stats *seen, double mean, double variance, double bound)
 {
     const char *const hint = "standard_error^2 n is not the variance of this estimator";
-    if (is_even_chance(mean, variance)) pt_check_near(name, seen->mean, variance, 0.01 * variance, hint);
-    else pt_check_mean(name, seen, variance, 0, bound, PT_TEST_VALUES, hint);
+    if (is_even_chance(mean, variance))
+        pt_check_near(name, seen->mean, variance, 0.01 * variance, hint);
+    else
+        pt_check_mean(name, seen, variance, 0, bound, PT_TEST_VALUES, hint);
 }
 
 /* Mean and variance of independent values. variance < 0: not tested; 0 has its own test. The variance of one
@@ -323,7 +328,8 @@ static void mean_and_variance(const job *j, uint32_t n, double variance, double 
     check_variance(name, &t.variance, j->exact, variance, variance_bound);
 }
 
-static void plain_table(const char *table, pt_integrand f, const char *first, const char *second, uint64_t seed)
+static void plain_table(const char *table, pt_integrand f, const char *first, const char *second,
+                        uint64_t seed)
 {
     const row *r;
     int at = 0;
@@ -368,8 +374,8 @@ static void nd_rows(const char *what, pt_integrand f, uint64_t seed)
         j.a[0] = j.dimensions;
         j.exact = r->value;
         if (exact > 0) /* the squares of ten factors are too skewed: see peaks */
-            mean_and_variance(&j, j.dimensions == 10 ? 4096 : 1024, j.dimensions == 10 && f == product ? -1 : exact,
-                              0.1, 0.15, seed);
+            mean_and_variance(&j, j.dimensions == 10 ? 4096 : 1024,
+                              j.dimensions == 10 && f == product ? -1 : exact, 0.1, 0.15, seed);
     }
 }
 
@@ -387,8 +393,11 @@ static void genz(void)
     static const struct {
         const char *quantity;
         pt_integrand f;
-    } family[5] = {{"productpeak_I", product_peak}, {"gaussian_I", genz_gaussian}, {"cornerpeak_I", corner_peak},
-                   {"discontinuous_I", discontinuous}, {"oscillatory_I", oscillatory}};
+    } family[5] = {{"productpeak_I", product_peak},
+                   {"gaussian_I", genz_gaussian},
+                   {"cornerpeak_I", corner_peak},
+                   {"discontinuous_I", discontinuous},
+                   {"oscillatory_I", oscillatory}};
     static const pt_sampler_kind kinds[3] = {PT_SAMPLER_SOBOL, PT_SAMPLER_INDEPENDENT, PT_SAMPLER_STRATIFIED};
     static const char *const names[3] = {"sobol", "independent", "stratified"};
     uint64_t seed = 60000;
@@ -397,7 +406,10 @@ static void genz(void)
         for (at = 0; at < row_count;) {
             const row *const r = next_row("MC-GENZ", family[i].quantity, &at);
             if (!r) break;
-            for (k = 0; k < 3; k++, seed += 100) {
+            for (k = 0; k < 3; k++, seed += 300) {
+                const int independent = kinds[k] == PT_SAMPLER_INDEPENDENT;
+                const uint32_t n = independent ? 8192 : 2048; /* corner peaks are skewed: more of them */
+                const uint32_t repeats = independent && family[i].f == corner_peak ? 256 : 64;
                 job j = {.name = r->params, .how = MEAN, .f = family[i].f};
                 tally t;
                 char name[80];
@@ -406,10 +418,9 @@ static void genz(void)
                 j.a[1] = parameter(r, "a");
                 j.a[2] = parameter(r, "u");
                 j.exact = r->value + (family[i].f == oscillatory ? 1 : 0);
-                t = repeat(&j, 64, pt_test_samples(8192), kinds[k], seed);
+                t = repeat(&j, repeats, pt_test_samples(n), kinds[k], seed);
                 sprintf(name, "%s %s, %s", r->id, family[i].quantity, names[k]);
-                pt_check_mean(name, &t.units, j.exact, 0, 0.05,
-                              kinds[k] == PT_SAMPLER_INDEPENDENT ? PT_TEST_VALUES : PT_TEST_MEANS,
+                pt_check_mean(name, &t.units, j.exact, 0, 0.1, independent ? PT_TEST_VALUES : PT_TEST_MEANS,
                               "see pt_estimate_mean");
             }
         }
@@ -488,7 +499,8 @@ static void second_moments(void)
 static void peaks(void)
 {
     double a[2], wide[2];
-    const pt_technique same = {tangent_warp, tangent_density, a}, wider = {tangent_warp, tangent_density, wide};
+    const pt_technique same = {tangent_warp, tangent_density, a},
+                       wider = {tangent_warp, tangent_density, wide};
     pt_integral p = {lorentzian, a, 1, pt_test_samples(1u << 18), PT_SAMPLER_INDEPENDENT, 0};
     power_law linear = {1, 10};
     const pt_technique corner = {power_warp, power_density, &linear};
@@ -554,6 +566,7 @@ static void show_order(const job *j, const char *name, double theory, uint64_t s
 static void heavy_tails(void)
 {
     job j = {.how = MEAN, .f = power_of, .dimensions = 1, .law = {{0, 1}, {0, 1}}};
+    tally t;
     const row *r;
     char name[80];
     int at = 0;
@@ -565,8 +578,10 @@ static void heavy_tails(void)
         sprintf(name, "x^-%g%s", a, a >= 0.5 ? ", infinite variance" : "");
         show_order(&j, name, r->value, (uint64_t)(70000 + 2000 * at));
         if (a > 0.3) continue; /* the third moment is infinite too */
-        j.name = name;
-        mean_and_variance(&j, 1024, -1, 0.02, 0, 69000);
+        t = repeat(&j, REPEATS, pt_test_samples(1024), PT_SAMPLER_INDEPENDENT, 69000);
+        /* Its skewness is 7.07, little for so many values; seen in the values it would jump about, as their
+           sixth moment is infinite. */
+        pt_check_mean("mean: x^-0.25", &t.units, j.exact, 0, 0.02, PT_TEST_MEANS, "see pt_estimate_mean");
     }
     j.how = IMPORTANCE; /* q = 5 is infinite: x^-3 / 6 where density 6 x^5 hardly ever goes */
     j.a[0] = 2;
@@ -585,33 +600,130 @@ static void heavy_tails(void)
 static const job jobs[] = {
     {.name = "mean", .how = MEAN, .f = power_of, .a = {2}, .dimensions = 1, .exact = 1.0 / 3},
     {.name = "antithetic", .how = ANTITHETIC, .f = power_of, .a = {2}, .dimensions = 1, .exact = 1.0 / 3},
-    {.name = "antithetic, 5-D", .how = ANTITHETIC, .f = product, .a = {5}, .dimensions = 5, .exact = 1.0 / 32},
-    {.name = "importance", .how = IMPORTANCE, .f = power_of, .a = {2}, .dimensions = 1,
-     .law = {{1, 1}, {0, 1}}, .exact = 1.0 / 3},
-    {.name = "importance, 3-D", .how = IMPORTANCE, .f = product, .a = {3}, .dimensions = 3,
-     .law = {{0.5, 3}, {0, 1}}, .exact = 1.0 / 8},
-    {.name = "control", .how = CONTROL, .f = power_of, .a = {2}, .dimensions = 1, .g = line,
-     .g_integral = 0.5, .c = 0.7, .exact = 1.0 / 3},
-    {.name = "MIS, power", .how = MIS, .f = power_of, .a = {2}, .dimensions = 1, .law = {{0, 1}, {1, 1}},
-     .counts = {1, 1}, .heuristic = PT_HEURISTIC_POWER, .exact = 1.0 / 3},
-    {.name = "MIS, balance, 2 + 1", .how = MIS, .f = power_of, .a = {2}, .dimensions = 1,
-     .law = {{0, 1}, {1, 1}}, .counts = {2, 1}, .heuristic = PT_HEURISTIC_BALANCE, .exact = 1.0 / 3},
-    {.name = "MIS, maximum, 1 + 3", .how = MIS, .f = power_of, .a = {2}, .dimensions = 1,
-     .law = {{0, 1}, {1, 1}}, .counts = {1, 3}, .heuristic = PT_HEURISTIC_MAXIMUM, .exact = 1.0 / 3},
-    {.name = "MIS, power, 0 + 2", .how = MIS, .f = power_of, .a = {2}, .dimensions = 1,
-     .law = {{0, 1}, {1, 1}}, .counts = {0, 2}, .heuristic = PT_HEURISTIC_POWER, .exact = 1.0 / 3},
-    {.name = "MIS, the same twice, maximum", .how = MIS, .f = power_of, .a = {2}, .dimensions = 1,
-     .law = {{1, 1}, {1, 1}}, .counts = {1, 1}, .heuristic = PT_HEURISTIC_MAXIMUM, .exact = 1.0 / 3},
-    {.name = "one-sample MIS, power", .how = MIS_ONE, .f = power_of, .a = {2}, .dimensions = 1,
-     .law = {{0, 1}, {1, 1}}, .shares = {0.3, 0.7}, .heuristic = PT_HEURISTIC_POWER, .exact = 1.0 / 3},
-    {.name = "one-sample MIS, balance", .how = MIS_ONE, .f = power_of, .a = {2}, .dimensions = 1,
-     .law = {{0, 1}, {1, 1}}, .shares = {0.5, 0.5}, .heuristic = PT_HEURISTIC_BALANCE, .exact = 1.0 / 3},
-    {.name = "one-sample MIS, maximum", .how = MIS_ONE, .f = power_of, .a = {2}, .dimensions = 1,
-     .law = {{0, 1}, {1, 1}}, .shares = {0.6, 0.4}, .heuristic = PT_HEURISTIC_MAXIMUM, .exact = 1.0 / 3},
-    {.name = "one-sample MIS, 0 + 1", .how = MIS_ONE, .f = power_of, .a = {2}, .dimensions = 1,
-     .law = {{0, 1}, {1, 1}}, .shares = {0, 1}, .heuristic = PT_HEURISTIC_BALANCE, .exact = 1.0 / 3},
-    {.name = "roulette", .how = ROULETTE, .f = power_of, .a = {2}, .dimensions = 1, .q = 0.4, .exact = 1.0 / 3},
-    {.name = "splitting", .how = SPLITTING, .f = product, .a = {3}, .dimensions = 3, .outer = 1, .splits = 3,
+    {.name = "antithetic, 5-D",
+     .how = ANTITHETIC,
+     .f = product,
+     .a = {5},
+     .dimensions = 5,
+     .exact = 1.0 / 32},
+    {.name = "importance",
+     .how = IMPORTANCE,
+     .f = power_of,
+     .a = {2},
+     .dimensions = 1,
+     .law = {{1, 1}, {0, 1}},
+     .exact = 1.0 / 3},
+    {.name = "importance, 3-D",
+     .how = IMPORTANCE,
+     .f = product,
+     .a = {3},
+     .dimensions = 3,
+     .law = {{0.5, 3}, {0, 1}},
+     .exact = 1.0 / 8},
+    {.name = "control",
+     .how = CONTROL,
+     .f = power_of,
+     .a = {2},
+     .dimensions = 1,
+     .g = line,
+     .g_integral = 0.5,
+     .c = 0.7,
+     .exact = 1.0 / 3},
+    {.name = "MIS, power",
+     .how = MIS,
+     .f = power_of,
+     .a = {2},
+     .dimensions = 1,
+     .law = {{0, 1}, {1, 1}},
+     .counts = {1, 1},
+     .heuristic = PT_HEURISTIC_POWER,
+     .exact = 1.0 / 3},
+    {.name = "MIS, balance, 2 + 1",
+     .how = MIS,
+     .f = power_of,
+     .a = {2},
+     .dimensions = 1,
+     .law = {{0, 1}, {1, 1}},
+     .counts = {2, 1},
+     .heuristic = PT_HEURISTIC_BALANCE,
+     .exact = 1.0 / 3},
+    {.name = "MIS, maximum, 1 + 3",
+     .how = MIS,
+     .f = power_of,
+     .a = {2},
+     .dimensions = 1,
+     .law = {{0, 1}, {1, 1}},
+     .counts = {1, 3},
+     .heuristic = PT_HEURISTIC_MAXIMUM,
+     .exact = 1.0 / 3},
+    {.name = "MIS, power, 0 + 2",
+     .how = MIS,
+     .f = power_of,
+     .a = {2},
+     .dimensions = 1,
+     .law = {{0, 1}, {1, 1}},
+     .counts = {0, 2},
+     .heuristic = PT_HEURISTIC_POWER,
+     .exact = 1.0 / 3},
+    {.name = "MIS, the same twice, maximum",
+     .how = MIS,
+     .f = power_of,
+     .a = {2},
+     .dimensions = 1,
+     .law = {{1, 1}, {1, 1}},
+     .counts = {1, 1},
+     .heuristic = PT_HEURISTIC_MAXIMUM,
+     .exact = 1.0 / 3},
+    {.name = "one-sample MIS, power",
+     .how = MIS_ONE,
+     .f = power_of,
+     .a = {2},
+     .dimensions = 1,
+     .law = {{0, 1}, {1, 1}},
+     .shares = {0.3, 0.7},
+     .heuristic = PT_HEURISTIC_POWER,
+     .exact = 1.0 / 3},
+    {.name = "one-sample MIS, balance",
+     .how = MIS_ONE,
+     .f = power_of,
+     .a = {2},
+     .dimensions = 1,
+     .law = {{0, 1}, {1, 1}},
+     .shares = {0.5, 0.5},
+     .heuristic = PT_HEURISTIC_BALANCE,
+     .exact = 1.0 / 3},
+    {.name = "one-sample MIS, maximum",
+     .how = MIS_ONE,
+     .f = power_of,
+     .a = {2},
+     .dimensions = 1,
+     .law = {{0, 1}, {1, 1}},
+     .shares = {0.6, 0.4},
+     .heuristic = PT_HEURISTIC_MAXIMUM,
+     .exact = 1.0 / 3},
+    {.name = "one-sample MIS, 0 + 1",
+     .how = MIS_ONE,
+     .f = power_of,
+     .a = {2},
+     .dimensions = 1,
+     .law = {{0, 1}, {1, 1}},
+     .shares = {0, 1},
+     .heuristic = PT_HEURISTIC_BALANCE,
+     .exact = 1.0 / 3},
+    {.name = "roulette",
+     .how = ROULETTE,
+     .f = power_of,
+     .a = {2},
+     .dimensions = 1,
+     .q = 0.4,
+     .exact = 1.0 / 3},
+    {.name = "splitting",
+     .how = SPLITTING,
+     .f = product,
+     .a = {3},
+     .dimensions = 3,
+     .outer = 1,
+     .splits = 3,
      .exact = 1.0 / 8}};
 #define JOBS (int)(sizeof jobs / sizeof jobs[0])
 
@@ -627,12 +739,12 @@ static void unbiased(void)
 {
     static const pt_sampler_kind kinds[3] = {PT_SAMPLER_SOBOL, PT_SAMPLER_INDEPENDENT, PT_SAMPLER_STRATIFIED};
     static const char *const names[3] = {"sobol", "independent", "stratified"};
-    const uint32_t n = pt_test_samples(1024);
+    const uint32_t n = pt_test_samples(256);
     char name[96];
     int i, k;
     for (i = 0; i < JOBS; i++)
         for (k = 0; k < 3; k++) {
-            const tally t = repeat(&jobs[i], 128, n, kinds[k], (uint64_t)(110000 + 300 * (3 * i + k)));
+            const tally t = repeat(&jobs[i], 512, n, kinds[k], (uint64_t)(500000 + 600 * (3 * i + k)));
             sprintf(name, "%s, %s", jobs[i].name, names[k]);
             pt_check_mean(name, &t.units, jobs[i].exact, 0, 0.05,
                           kinds[k] == PT_SAMPLER_INDEPENDENT ? PT_TEST_VALUES : PT_TEST_MEANS,
@@ -675,7 +787,8 @@ static double mis_moment(const mis_case *m, int i, int squared, double low, doub
     int panel, k;
     for (panel = 0; panel < panels; panel++)
         for (k = 0; k < 3; k++) {
-            const double x = low + half * (2 * panel + 1 + node[k]), wf = mis_weight_of(m, i, x) * pow(x, m->p);
+            const double x = low + half * (2 * panel + 1 + node[k]),
+                         wf = mis_weight_of(m, i, x) * pow(x, m->p);
             sum += weight[k] * (squared ? wf * wf / (m->n[i] * (i ? 2 * x : 1)) : wf);
         }
     return sum * half / 9;
@@ -711,7 +824,7 @@ static void one_mis_variance(const char *label, const mis_case *m, double exact,
         j.counts[i] = (int)m->n[i];
         j.shares[i] = m->n[i];
     }
-    mean_and_variance(&j, 256, exact, 0.02, 0.05, seed);
+    mean_and_variance(&j, 128, exact, 0.03, 0.06, seed);
 }
 
 static void mis_rows(const char *quantity, pt_heuristic heuristic, int one, uint64_t seed)
@@ -732,10 +845,11 @@ static void mis_rows(const char *quantity, pt_heuristic heuristic, int one, uint
 
 static void mis_variances(void)
 {
-    static const mis_case others[8] = {{2, {1, 1}, PT_HEURISTIC_MAXIMUM, 0},  {1, {2, 1}, PT_HEURISTIC_BALANCE, 0},
-                                       {2, {1, 3}, PT_HEURISTIC_POWER, 0},    {2, {4, 4}, PT_HEURISTIC_BALANCE, 0},
-                                       {5, {1, 2}, PT_HEURISTIC_MAXIMUM, 0},  {2, {0.25, 0.75}, PT_HEURISTIC_BALANCE, 1},
-                                       {1, {0.75, 0.25}, PT_HEURISTIC_POWER, 1}, {2, {0.5, 0.5}, PT_HEURISTIC_MAXIMUM, 1}};
+    static const mis_case others[8] = {
+        {2, {1, 1}, PT_HEURISTIC_MAXIMUM, 0},     {1, {2, 1}, PT_HEURISTIC_BALANCE, 0},
+        {2, {1, 3}, PT_HEURISTIC_POWER, 0},       {2, {4, 4}, PT_HEURISTIC_BALANCE, 0},
+        {5, {1, 2}, PT_HEURISTIC_MAXIMUM, 0},     {2, {0.25, 0.75}, PT_HEURISTIC_BALANCE, 1},
+        {1, {0.75, 0.25}, PT_HEURISTIC_POWER, 1}, {2, {0.5, 0.5}, PT_HEURISTIC_MAXIMUM, 1}};
     int i;
     mis_rows("Var_balance", PT_HEURISTIC_BALANCE, 0, 130000);
     mis_rows("Var_power2", PT_HEURISTIC_POWER, 0, 135000);
@@ -768,7 +882,8 @@ static void importance_variances(void)
 static void other_variances(void)
 {
     static const double c[3] = {0, 1, 1.6903090292428586}, q[3] = {1, 0.5, 0.1};
-    const double covariance = 0.5 * (3 - 2.7182818284590452), variance = find_row("MC-EXP", "Var", "a=1")->value;
+    const double covariance = 0.5 * (3 - 2.7182818284590452),
+                 variance = find_row("MC-EXP", "Var", "a=1")->value;
     job antithetic = jobs[1];
     job control = {.how = CONTROL, .f = exponential, .a = {1}, .dimensions = 1, .g = line, .g_integral = 0.5};
     job roulette = {.how = ROULETTE, .f = power_of, .a = {2}, .dimensions = 1, .exact = 1.0 / 3};
@@ -796,7 +911,7 @@ static void other_variances(void)
 }
 
 /* ---------------------------------------------------------------------------------------------------------
-   Well-spread points: their exact variances. A spread is the variance of means of n points, seen in 32 sets. */
+   Well-spread points: their exact variances. A spread is the variance of means of n points, from 32 sets. */
 
 typedef double (*spread)(const job *j, uint32_t n, uint64_t seed);
 
@@ -844,7 +959,7 @@ static double spread_of_runs(const job *j, uint32_t n, uint64_t seed)
     uint64_t i;
     for (i = 0; i < 32; i++) {
         pt_estimate e;
-        run(j, n, PT_SAMPLER_INDEPENDENT, 32 * seed + i, &e);
+        run(j, n, PT_SAMPLER_INDEPENDENT, pt_hash64(32 * seed + i), &e);
         pt_stats_add(&means, e.value);
     }
     return pt_stats_variance(&means);
@@ -852,18 +967,21 @@ static double spread_of_runs(const job *j, uint32_t n, uint64_t seed)
 
 static void expect_spread(const row *r, spread of, const job *j, uint32_t n, uint64_t seed)
 {
-    const uint32_t runs = pt_test_samples(n > 64 ? 640 : 1024);
+    const uint32_t runs = pt_test_samples(n > 64 ? 400 : 640);
     pt_stats seen = PT_STATS_INIT;
     char name[80];
     uint32_t i;
     for (i = 0; i < runs; i++) pt_stats_add(&seen, of(j, n, seed + i));
     sprintf(name, "%s %s, %s", r->id, r->quantity, r->params);
-    pt_check_mean(name, &seen, r->value, r->error, 0.1, PT_TEST_VALUES, "are the points spread as they should?");
+    pt_check_mean(name, &seen, r->value, r->error, 0.12, PT_TEST_MEANS,
+                  "are the points spread as they should?");
 }
 
 static const job on_line = {.name = "x", .how = MEAN, .f = line, .dimensions = 1, .exact = 0.5};
-static const job on_plane = {.name = "x + y", .how = MEAN, .f = sum_of, .a = {2}, .dimensions = 2, .exact = 1};
-static const job on_step = {.name = "x < 0.3", .how = MEAN, .f = step, .a = {0.3}, .dimensions = 2, .exact = 0.3};
+static const job on_plane = {
+    .name = "x + y", .how = MEAN, .f = sum_of, .a = {2}, .dimensions = 2, .exact = 1};
+static const job on_step = {
+    .name = "x < 0.3", .how = MEAN, .f = step, .a = {0.3}, .dimensions = 2, .exact = 0.3};
 static const job on_saddle = {.name = "saddle", .how = MEAN, .f = centred_product, .dimensions = 2};
 
 static void stratified_variances(void)
@@ -928,7 +1046,8 @@ static void hammersley(void)
             product_mean += x[i] * y[i] / n;
         }
         near_relative(r->id, mean, r->value, 1e-15);
-        near_relative("mean of x y", product_mean, find_row("MC-QMC", "Hammersley_mean_xy", r->params)->value, 1e-15);
+        near_relative("mean of x y", product_mean, find_row("MC-QMC", "Hammersley_mean_xy", r->params)->value,
+                      1e-15);
         near_relative("star discrepancy", star_discrepancy(x, y, n),
                       find_row("MC-QMC", "Hammersley_L2star", r->params)->value, 1e-8);
     }
@@ -959,8 +1078,8 @@ static void one_order(const order_case *o, int too_slow, uint64_t seed)
         pt_stats_add(&slopes, 0.5 * log(many / few) / log(16));
     }
     half = pt_stats_interval(&slopes, 0.99);
-    printf("shown  %-48s n^%.4f to n^%.4f with confidence 99 %%, theory n^%.4f\n", o->name, slopes.mean - half,
-           slopes.mean + half, o->order);
+    printf("shown  %-48s n^%.4f to n^%.4f with confidence 99 %%, theory n^%.4f\n", o->name,
+           slopes.mean - half, slopes.mean + half, o->order);
     pt_check_mean(o->name, &slopes, o->order, o->uncertainty, 0.06 + fabs(8 * o->uncertainty / o->order),
                   PT_TEST_MEANS, "the error falls in another order than theory says");
     if (too_slow) pt_check_rejects_mean("which is not n^-1/2", &slopes, -0.5, 0, PT_TEST_MEANS, "see above");
@@ -972,19 +1091,22 @@ static void orders(void)
 {
     static const job bend = {.name = "e^x", .how = MEAN, .f = exponential, .a = {1}, .dimensions = 1};
     static const job disk = {.name = "disk", .how = MEAN, .f = ball, .a = {2}, .dimensions = 2};
-    static const job peak = {.name = "peak", .how = MEAN, .f = product_peak, .a = {2, 1, 0.3}, .dimensions = 2};
+    static const job peak = {
+        .name = "peak", .how = MEAN, .f = product_peak, .a = {2, 1, 0.3}, .dimensions = 2};
     const double logarithm = 0.5 *
                              log(find_row("MC-OWEN", "Var_centredproduct", "m=8")->value /
-                                 find_row("MC-OWEN", "Var_centredproduct", "m=4")->value) / log(16);
-    const order_case cases[9] = {{"order: independent, e^x", spread_of_runs, &bend, 32, -0.5, 0},
-                                 {"order: independent, quarter disk", spread_of_runs, &disk, 32, -0.5, 0},
-                                 {"order: strata on a line, e^x", spread_of_strata, &bend, 16, -1.5, 0.001},
-                                 {"order: cells in a square, peak", spread_of_grids, &peak, 16, -1, 0.002},
-                                 {"order: cells in a square, straight edge", spread_of_grids, &on_step, 16, -0.75, 0},
-                                 {"order: cells in a square, quarter disk", spread_of_grids, &disk, 16, -0.75, 0.01},
-                                 {"order: scrambled on a line, e^x", spread_of_nets, &bend, 16, -1.5, 0.001},
-                                 {"order: scrambled in a square, (x-1/2)(y-1/2)", spread_of_nets, &on_saddle, 16, logarithm, 0},
-                                 {"order: scrambled in a square, quarter disk", spread_of_nets, &disk, 16, -0.75, 0.01}};
+                                 find_row("MC-OWEN", "Var_centredproduct", "m=4")->value) /
+                             log(16);
+    const order_case cases[9] = {
+        {"order: independent, e^x", spread_of_runs, &bend, 32, -0.5, 0},
+        {"order: independent, quarter disk", spread_of_runs, &disk, 32, -0.5, 0},
+        {"order: strata on a line, e^x", spread_of_strata, &bend, 16, -1.5, 0.001},
+        {"order: cells in a square, peak", spread_of_grids, &peak, 16, -1, 0.002},
+        {"order: cells in a square, straight edge", spread_of_grids, &on_step, 16, -0.75, 0},
+        {"order: cells in a square, quarter disk", spread_of_grids, &disk, 16, -0.75, 0.01},
+        {"order: scrambled on a line, e^x", spread_of_nets, &bend, 16, -1.5, 0.001},
+        {"order: scrambled in a square, (x-1/2)(y-1/2)", spread_of_nets, &on_saddle, 16, logarithm, 0},
+        {"order: scrambled in a square, quarter disk", spread_of_nets, &disk, 16, -0.75, 0.01}};
     int i;
     for (i = 0; i < 9; i++) one_order(&cases[i], i >= 2, (uint64_t)(300000 + 2000 * i));
 }
@@ -1009,10 +1131,12 @@ static void bookkeeping(void)
     pt_estimate e, again;
     double before, used;
     pt_estimate_roulette(&p, 0.3, &e);
-    pt_check(e.evaluations == calls && calls < 400, "evaluations of roulette", "%g, not %g", e.evaluations, calls);
+    pt_check(e.evaluations == calls && calls < 400, "evaluations of roulette", "%g, not %g", e.evaluations,
+             calls);
     calls = 0;
     pt_estimate_mis(&p, t, counts, 2, PT_HEURISTIC_POWER, &e);
-    pt_check(e.evaluations == calls && calls == 5000, "evaluations of MIS", "%g, not %g", e.evaluations, calls);
+    pt_check(e.evaluations == calls && calls == 5000, "evaluations of MIS", "%g, not %g", e.evaluations,
+             calls);
     calls = 0;
     pt_estimate_mis_one(&p, t, shares, 2, PT_HEURISTIC_POWER, &e);
     pt_check(e.evaluations == calls && calls == 1000, "evaluations of one-sample MIS", "%g, not %g",
@@ -1025,21 +1149,23 @@ static void bookkeeping(void)
     pt_estimate_mean(&p, &e);
     used = pt_cpu_seconds() - before;
     pt_check(e.seconds > 0 && e.seconds <= used, "seconds", "%g s of %g s", e.seconds, used);
-    near_relative("efficiency is 1 / (standard error^2 seconds)", e.efficiency * e.standard_error * e.standard_error * e.seconds,
-                  1, 1e-14);
-    near_relative("standard error is that of the units", e.standard_error, pt_stats_standard_error(&e.units), 1e-15);
+    near_relative("efficiency is 1 / (standard error^2 seconds)",
+                  e.efficiency * e.standard_error * e.standard_error * e.seconds, 1, 1e-14);
+    near_relative("standard error is that of the units", e.standard_error, pt_stats_standard_error(&e.units),
+                  1e-15);
     pt_check(e.value == e.units.mean && e.units.n == p.n, "value is the mean of the units", "%g of %g units",
              e.value, e.units.n);
     pt_estimate_mean(&p, &again);
-    pt_check(again.value == e.value, "the same seed, the same estimate", "%.17g and %.17g", e.value, again.value);
+    pt_check(again.value == e.value, "the same seed, the same estimate", "%.17g and %.17g", e.value,
+             again.value);
     p.seed = 8;
     pt_estimate_mean(&p, &again);
     pt_check(again.value != e.value, "another seed, another estimate", "the same %.17g", e.value);
     p.sampler = PT_SAMPLER_SOBOL;
     p.n = 1000;
     pt_estimate_mean(&p, &e);
-    pt_check(e.units.n == 32 && e.evaluations == 992, "randomised point sets", "%g sets, %g evaluations", e.units.n,
-             e.evaluations);
+    pt_check(e.units.n == 32 && e.evaluations == 992, "randomised point sets", "%g sets, %g evaluations",
+             e.units.n, e.evaluations);
 }
 
 static int refuses(pt_result r) { return r == PT_ERROR_ARGUMENT; }
@@ -1055,7 +1181,8 @@ static void refusals_by_all(const char *what, const pt_integral *p)
     pt_check(refuses(pt_estimate_antithetic(p, &e)), what, "accepted by pt_estimate_antithetic");
     pt_check(refuses(pt_estimate_importance(p, &t, &e)), what, "accepted by pt_estimate_importance");
     pt_check(refuses(pt_estimate_control(p, line, 0.5, 1, &e)), what, "accepted by pt_estimate_control");
-    pt_check(refuses(pt_estimate_mis(p, &t, &one, 1, PT_HEURISTIC_POWER, &e)), what, "accepted by pt_estimate_mis");
+    pt_check(refuses(pt_estimate_mis(p, &t, &one, 1, PT_HEURISTIC_POWER, &e)), what,
+             "accepted by pt_estimate_mis");
     pt_check(refuses(pt_estimate_mis_one(p, &t, &all, 1, PT_HEURISTIC_POWER, &e)), what,
              "accepted by pt_estimate_mis_one");
     pt_check(refuses(pt_estimate_roulette(p, 0.5, &e)), what, "accepted by pt_estimate_roulette");
@@ -1113,8 +1240,10 @@ static void refusals(void)
     p.sampler = (pt_sampler_kind)17;
     refusals_by_all("an unknown sampler", &p);
     pt_check(refuses(pt_estimate_control(&good, NULL, 0.5, 1, &e)), "no control variate", "accepted");
-    pt_check(refuses(pt_estimate_control(&good, line, (double)NAN, 1, &e)), "unknown integral of g", "accepted");
-    pt_check(refuses(pt_estimate_control(&good, line, 0.5, HUGE_VAL, &e)), "infinite coefficient", "accepted");
+    pt_check(refuses(pt_estimate_control(&good, line, (double)NAN, 1, &e)), "unknown integral of g",
+             "accepted");
+    pt_check(refuses(pt_estimate_control(&good, line, 0.5, HUGE_VAL, &e)), "infinite coefficient",
+             "accepted");
     pt_check(refuses(pt_estimate_roulette(&good, 0, &e)), "q = 0", "accepted");
     pt_check(refuses(pt_estimate_roulette(&good, 1.001, &e)), "q > 1", "accepted");
     pt_check(refuses(pt_estimate_roulette(&good, (double)NAN, &e)), "q = NaN", "accepted");
@@ -1124,17 +1253,18 @@ static void refusals(void)
     refused_techniques();
 }
 
-/* ---------------------------------------------------------------------------------------------------------
-   Wrong estimators of the integral of x^2 over [0,1], 1/3: all must be found out. */
-
 static void maximum_heuristic(void)
 {
     const pt_heuristic h = PT_HEURISTIC_MAXIMUM;
     pt_check(pt_mis_weight(2, 1, h) == 1 && pt_mis_weight(1, 2, h) == 0, "maximum heuristic",
              "all to the larger density");
     pt_check(pt_mis_weight(1, 1, h) == 1, "maximum heuristic", "of equal densities the first takes all");
-    pt_check(pt_mis_weight(0, 0, h) == 0 && pt_mis_weight(0, 1, h) == 0, "maximum heuristic", "density 0 gives 0");
+    pt_check(pt_mis_weight(0, 0, h) == 0 && pt_mis_weight(0, 1, h) == 0, "maximum heuristic",
+             "density 0 gives 0");
 }
+
+/* ---------------------------------------------------------------------------------------------------------
+   Wrong estimators of the integral of x^2 over [0,1], 1/3: all must be found out. */
 
 static double roulette_unweighted(const double *u, void *user)
 {
@@ -1197,8 +1327,10 @@ static void wrong_estimators(void)
         memcpy(a, weights[i], sizeof weights[i]);
         p.seed++;
         pt_estimate_mean(&p, &e);
-        if (i > 1) expect_wrong(names[i], &e);
-        else pt_check_mean(names[i], &e.units, 1.0 / 3, 0, 0.05, PT_TEST_VALUES, "see pt_mis_weight");
+        if (i > 1)
+            expect_wrong(names[i], &e);
+        else
+            pt_check_mean(names[i], &e.units, 1.0 / 3, 0, 0.05, PT_TEST_VALUES, "see pt_mis_weight");
     }
     p.f = power_of;
     p.dimensions = 1;
@@ -1228,11 +1360,16 @@ static void critical_values(void)
         near_relative(r->id, 2 * pt_normal_sf(r->value), level / m, 1e-13);
     }
     for (at = 0; (r = next_row("ST-N", "N", &at)) != NULL;) /* level 1e-4, power 0.99 */
-        near_relative(r->id, pow((pt_normal_isf(0.5e-4) + pt_normal_isf(0.01)) * parameter(r, "cv") / parameter(r, "delta"), 2),
-                      r->value, 1e-13);
+        near_relative(
+            r->id,
+            pow((pt_normal_isf(0.5e-4) + pt_normal_isf(0.01)) * parameter(r, "cv") / parameter(r, "delta"),
+                2),
+            r->value, 1e-13);
     for (at = 0; (r = next_row("ST-BIAS", "delta", &at)) != NULL;)
-        near_relative(r->id, (pt_normal_isf(0.5e-4 / parameter(r, "m")) + pt_normal_isf(0.01)) * parameter(r, "cv") /
-                                 sqrt(parameter(r, "N")), r->value, 1e-13);
+        near_relative(r->id,
+                      (pt_normal_isf(0.5e-4 / parameter(r, "m")) + pt_normal_isf(0.01)) * parameter(r, "cv") /
+                          sqrt(parameter(r, "N")),
+                      r->value, 1e-13);
 }
 
 /* n values of standard error 1 around `mean` */
@@ -1273,9 +1410,11 @@ static void p_values_of_rows(void)
 
 static void p_values_by_hand(void)
 {
-    static const double expected[6] = {2, 3, 10, 4, 6, 1}, observed[6] = {4, 4, 8, 3, 6, 1}, few[3] = {1, 1, 2};
+    static const double expected[6] = {2, 3, 10, 4, 6, 1}, observed[6] = {4, 4, 8, 3, 6, 1},
+                        few[3] = {1, 1, 2};
     static const double first[3] = {1, 2, 4}, a[2] = {0, 2}, b[2] = {3, 5};
-    pt_stats s = PT_STATS_INIT, sa = PT_STATS_INIT, sb = PT_STATS_INIT, same = PT_STATS_INIT, one = PT_STATS_INIT;
+    pt_stats s = PT_STATS_INIT, sa = PT_STATS_INIT, sb = PT_STATS_INIT, same = PT_STATS_INIT,
+             one = PT_STATS_INIT;
     const double t = 4 / sqrt(7), w = 3 / sqrt(2);
     int i;
     for (i = 0; i < 3; i++) pt_stats_add(&s, first[i]);
@@ -1286,16 +1425,22 @@ static void p_values_by_hand(void)
     }
     pt_stats_add(&one, 3);
     /* two degrees of freedom: P(|T| > t) = 2 / (r (r + t)) with r = sqrt(t^2 + 2) */
-    near_relative("p of a mean", pt_p_value_mean(&s, 1), 2 / (sqrt(t * t + 2) * (sqrt(t * t + 2) + t)), 1e-13);
-    near_relative("p of two means", pt_p_value_equal_means(&sa, &sb), 2 / (sqrt(w * w + 2) * (sqrt(w * w + 2) + w)),
+    near_relative("p of a mean", pt_p_value_mean(&s, 1), 2 / (sqrt(t * t + 2) * (sqrt(t * t + 2) + t)),
                   1e-13);
-    pt_check(pt_p_value_mean(&s, s.mean) == 1 && pt_p_value_equal_means(&sa, &sa) == 1, "no deviation", "p is not 1");
-    pt_check(pt_p_value_mean(&same, 3) == 1 && pt_p_value_mean(&same, 3.5) == 0, "no spread", "p must be 1 or 0");
+    near_relative("p of two means", pt_p_value_equal_means(&sa, &sb),
+                  2 / (sqrt(w * w + 2) * (sqrt(w * w + 2) + w)), 1e-13);
+    /* only one of them spreads: Satterthwaite gives its one degree of freedom */
+    near_relative("p of two means, Satterthwaite", pt_p_value_equal_means(&sa, &same), 2 * atan(0.5) / PT_PI, 1e-13);
+    pt_check(pt_p_value_mean(&s, s.mean) == 1 && pt_p_value_equal_means(&sa, &sa) == 1, "no deviation",
+             "p is not 1");
+    pt_check(pt_p_value_mean(&same, 3) == 1 && pt_p_value_mean(&same, 3.5) == 0, "no spread",
+             "p must be 1 or 0");
     pt_check(pt_p_value_equal_means(&same, &same) == 1, "equal, no spread", "p must be 1");
-    pt_check(pt_p_value_mean(&one, 7) == 1 && pt_p_value_equal_means(&one, &sa) == 1, "one value", "p must be 1");
+    pt_check(pt_p_value_mean(&one, 7) == 1 && pt_p_value_equal_means(&one, &sa) == 1, "one value",
+             "p must be 1");
     /* pooled: 5, 10, 10 + 1 are expected, 8, 8, 10 seen */
-    near_relative("p of counts", pt_p_value_counts(observed, expected, 6), exp(-0.5 * (9.0 / 5 + 4.0 / 10 + 1.0 / 11)),
-                  1e-13);
+    near_relative("p of counts", pt_p_value_counts(observed, expected, 6),
+                  exp(-0.5 * (9.0 / 5 + 4.0 / 10 + 1.0 / 11)), 1e-13);
     pt_check(pt_p_value_counts(expected, expected, 6) == 1, "counts as expected", "p must be 1");
     pt_check(pt_p_value_counts(few, few, 3) == 1, "too few for two cells", "p must be 1");
     pt_check(isinf(pt_stats_interval(&one, 0.9)), "interval of one value", "must be infinite");
@@ -1341,8 +1486,8 @@ static void expect_uniform_p(const char *name, double *p, uint32_t n)
     }
     tail = kolmogorov_sf(distance * sqrt((double)n));
     pt_test.statistical++;
-    printf("%s %-48s n %-8.0f Kolmogorov's distance %.3g  p %.3g\n", pt_test_count(!(tail < pt_test_level())), name,
-           (double)n, distance, tail);
+    printf("%s %-48s n %-8.0f Kolmogorov's distance %.3g  p %.3g\n", pt_test_count(!(tail < pt_test_level())),
+           name, (double)n, distance, tail);
 }
 
 #define P_VALUES 32768u
@@ -1359,7 +1504,7 @@ static void p_of_means(void)
     }
     expect_uniform_p("p of a mean of five", p_values, n);
     for (i = 0; i < n / 4; i++) {
-        const pt_stats a = normal_sample(&rng, 60, 7, 1), b = normal_sample(&rng, 40, 7, 3);
+        const pt_stats a = normal_sample(&rng, 20, 7, 1), b = normal_sample(&rng, 6, 7, 3);
         p_values[i] = pt_p_value_equal_means(&a, &b);
     }
     expect_uniform_p("p of two means, unlike variances", p_values, n / 4);
@@ -1374,7 +1519,8 @@ static void throw_counts(pt_pcg32 *rng, uint32_t tilt, double *observed)
     for (i = 0; i < 8192; i++) {
         at = pt_pcg32_next(rng) >> 21;
         if (tilt && i % tilt == 0) at /= 2;
-        for (cell = 8; cell > 0 && at < up_to[cell - 1]; cell--) {}
+        for (cell = 8; cell > 0 && at < up_to[cell - 1]; cell--) {
+        }
         observed[cell]++;
     }
 }
@@ -1402,7 +1548,8 @@ static void p_of_wrong(void)
     double observed[9];
     throw_counts(&rng, 6, observed);
     pt_check(pt_p_value_mean(&a, 7) < 1e-15, "p of a wrong mean", "%g", pt_p_value_mean(&a, 7));
-    pt_check(pt_p_value_equal_means(&a, &b) < 1e-15, "p of unlike means", "%g", pt_p_value_equal_means(&a, &b));
+    pt_check(pt_p_value_equal_means(&a, &b) < 1e-15, "p of unlike means", "%g",
+             pt_p_value_equal_means(&a, &b));
     pt_check(pt_p_value_counts(observed, expected, 9) < 1e-10, "p of wrong counts", "%g",
              pt_p_value_counts(observed, expected, 9));
 }
@@ -1429,8 +1576,8 @@ static void coverage(void)
         pt_stats_add(&covered[c], fabs(s.mean + 3) <= pt_stats_interval(&s, confidence[c]));
     }
     for (c = 0; c < 2; c++)
-        pt_check_mean("coverage of intervals of four values", &covered[c], confidence[c], 0, 0.06, PT_TEST_VALUES,
-                      "see pt_stats_interval");
+        pt_check_mean("coverage of intervals of four values", &covered[c], confidence[c], 0, 0.1,
+                      PT_TEST_VALUES, "see pt_stats_interval");
 }
 
 /* How far sample variances of n values scatter, relative to the variance: this depends on the kurtosis. */

@@ -922,7 +922,11 @@ static void direct_disk(void)
         pt_stats s = PT_STATS_INIT;
         disk_light disk = light[i];
         for (k = 0; k < UNITS; k++) {
-            const pt_integral integral = {disk_integrand, &disk, 2, pt_test_samples(512), PT_SAMPLER_SOBOL,
+            const pt_integral integral = {disk_integrand,
+                                          &disk,
+                                          2,
+                                          pt_test_samples(512),
+                                          PT_SAMPLER_SOBOL,
                                           pt_test_seed(480 + UNITS * (uint64_t)i + (uint64_t)k)};
             pt_estimate estimate;
             pt_estimate_mean(&integral, &estimate);
@@ -931,6 +935,40 @@ static void direct_disk(void)
         pt_check_mean(label("disk of radius %g at (%g, %g)", r, o, h), &s, exact, 1e-6 * exact, 0.005,
                       PT_TEST_MEANS, "the disk warp or its density 1/pi");
     }
+}
+
+/* Flat lamps shine on the side of their normal only, spheres on both: seen from there, and by what they
+   light. */
+static void one_sided(void)
+{
+    static const char *const name[4] = {"front of flat lamps", "back of flat lamps", "sphere from outside",
+                                        "sphere from inside"};
+    int i, m, flat;
+    for (i = 0; i < 4; i++)
+        for (m = 0; m < 3; m++)
+            for (flat = 0; flat < 2; flat++) {
+                const pt_vec3 a = v3(-1, 1, -1), b = v3(1, 1, -1), c = v3(0, 1, 1); /* looks down */
+                pt_scene s = PT_SCENE_INIT;
+                experiment e = experiment_of(&s, ray_from(v3(0, 0.5, 0), v3(0.01, 1, 0.02)), m);
+                pt_stats seen[3], floor[3];
+                add_floor(&s, 0.5);
+                if (i >= 2)
+                    pt_add_sphere(&s, v3(0, i == 2 ? 2 : 0.5, 0), 1, add_lamp(&s, 1));
+                else if (flat)
+                    pt_add_triangle(&s, a, i ? c : b, i ? b : c, add_lamp(&s, 1));
+                else
+                    pt_add_parallelogram(&s, a, v3(i ? 0 : 2, 0, i ? 2 : 0), v3(i ? 2 : 0, 0, i ? 0 : 2),
+                                         add_lamp(&s, 1));
+                s = committed(s);
+                e.options.max_edges = 2;
+                by_values(&e, 780, 100, seen);
+                e.ray = floor_ray();
+                by_values(&e, 781, 2000, floor);
+                pt_check(fabs(seen[0].mean - (i != 1)) <= 1e-6 && (floor[0].mean > 0) == (i != 1),
+                         label("%s %d, %s", name[i], flat, METHODS[m].name), "radiance %g, of the floor %g",
+                         seen[0].mean, floor[0].mean);
+                pt_scene_free(&s);
+            }
 }
 
 static void direct_point(void)
@@ -1449,8 +1487,7 @@ static void agreement_glass_ball(void)
 static void heuristics(void)
 {
     static const char *const name[3] = {"power", "balance", "maximum"};
-    const pt_camera inside =
-        pt_camera_look_at(v3(0.3, 1.3, 0.9), v3(-0.1, 0.5, -0.3), v3(0, 1, 0), 75);
+    const pt_camera inside = pt_camera_look_at(v3(0.3, 1.3, 0.9), v3(-0.1, 0.5, -0.3), v3(0, 1, 0), 75);
     pt_scene scene = room();
     pt_stats s[3][3];
     pt_li_options options;
@@ -1888,6 +1925,7 @@ int main(int argc, char **argv)
     PT_TEST(direct_parallelogram);
     PT_TEST(direct_triangle);
     PT_TEST(direct_disk);
+    PT_TEST_EXACT(one_sided);
     PT_TEST_EXACT(direct_point);
     PT_TEST(direct_together);
     PT_TEST(concentric_spheres);
