@@ -482,7 +482,7 @@ PTDEF double pt_stats_standard_error(const pt_stats *s);
 PTDEF double pt_stats_skewness(const pt_stats *s);
 
 /* Upper tail P(X > x) of the standard normal, Student's t with df > 0, and chi-squared with df > 0 degrees
-   of freedom; relative accuracy holds far into the tail. */
+   of freedom; relative accuracy holds far into the tail (Student: up to df = 1e7). */
 PTDEF double pt_normal_sf(double x);
 PTDEF double pt_student_sf(double x, double df);
 PTDEF double pt_chi2_sf(double x, double df);
