@@ -539,7 +539,7 @@ PTDEF pt_result pt_estimate_importance(const pt_integral *p, const pt_technique 
 /* Control variate: the mean of f(u) - c (g(u) - G) with a g whose integral G is known; g gets p->user. */
 PTDEF pt_result pt_estimate_control(const pt_integral *p, pt_integrand g, double g_integral, double c,
                                     pt_estimate *out);
-/* Multiple importance sampling with counts[i] >= 0 samples of each of `count` techniques, in [1, 8], a value
+/* Multiple importance sampling with counts[i] in [0, 1024] samples of each of `count` techniques, in [1, 8], a value
    [Vea97] 9.2; and with one sample a value, from technique i with probability share[i]: the shares sum to 1. */
 PTDEF pt_result pt_estimate_mis(const pt_integral *p, const pt_technique *techniques, const int *counts, int count,
                                 pt_heuristic heuristic, pt_estimate *out);
@@ -556,7 +556,8 @@ PTDEF pt_result pt_estimate_splitting(const pt_integral *p, int outer, int split
 PTDEF double pt_p_value_mean(const pt_stats *s, double exact);
 PTDEF double pt_p_value_equal_means(const pt_stats *a, const pt_stats *b);
 PTDEF double pt_p_value_counts(const double *observed, const double *expected, int cells);
-/* Half the width of the interval that contains the true mean with the given confidence in (0,1). */
+/* Half the width of the interval that contains the true mean with the given confidence in (0,1); at most 1e9
+   standard errors. */
 PTDEF double pt_stats_interval(const pt_stats *s, double confidence);
 
 /* =====================================================================================================
@@ -2328,7 +2329,7 @@ static double pti_value_antithetic(pti_estimator *e)
     double u[64], v[64];
     int d;
     pti_draw_numbers(e, u, 0, e->p->dimensions);
-    for (d = 0; d < e->p->dimensions; d++) v[d] = 1 - u[d];
+    for (d = 0; d < e->p->dimensions; d++) v[d] = fmin(1 - u[d], 1 - PTI_2_M53);
     return 0.5 * (pti_call(e, u) + pti_call(e, v));
 }
 

@@ -1430,7 +1430,8 @@ static void p_values_by_hand(void)
     near_relative("p of two means", pt_p_value_equal_means(&sa, &sb),
                   2 / (sqrt(w * w + 2) * (sqrt(w * w + 2) + w)), 1e-13);
     /* only one of them spreads: Satterthwaite gives its one degree of freedom */
-    near_relative("p of two means, Satterthwaite", pt_p_value_equal_means(&sa, &same), 2 * atan(0.5) / PT_PI, 1e-13);
+    near_relative("p of two means, Satterthwaite", pt_p_value_equal_means(&sa, &same), 2 * atan(0.5) / PT_PI,
+                  1e-13);
     pt_check(pt_p_value_mean(&s, s.mean) == 1 && pt_p_value_equal_means(&sa, &sa) == 1, "no deviation",
              "p is not 1");
     pt_check(pt_p_value_mean(&same, 3) == 1 && pt_p_value_mean(&same, 3.5) == 0, "no spread",

@@ -1493,11 +1493,11 @@ static void heuristics(void)
     pt_li_options options;
     int k;
     memset(&options, 0, sizeof options);
-    options.max_edges = 4;
+    options.max_edges = 3;
     options.roulette = PT_ROULETTE_NONE;
     for (k = 0; k < 3; k++) {
         options.heuristic = (pt_heuristic)k;
-        picture_means(&scene, &inside, &options, PATH, 1050 + (uint64_t)k, 768, tally_reflected, s[k]);
+        picture_means(&scene, &inside, &options, PATH, 1050 + (uint64_t)k, 1024, tally_reflected, s[k]);
     }
     for (k = 1; k < 3; k++)
         pt_check_equal_means(label("power = %s heuristic", name[k]), &s[0][1], &s[k][1], 0.02,
