@@ -494,7 +494,7 @@ PTDEF double pt_normal_isf(double p);
 typedef enum pt_heuristic { PT_HEURISTIC_POWER = 0, PT_HEURISTIC_BALANCE, PT_HEURISTIC_MAXIMUM } pt_heuristic;
 
 /* The weight of technique 1 with density p1 against technique 2 with density p2, as a ratio that cannot
-   overflow. p1 = 0 gives 0; equal densities share, but for the maximum heuristic, where the first takes all. */
+   overflow. p1 = 0 gives 0; equal densities share. */
 PTDEF double pt_mis_weight(double p1, double p2, pt_heuristic heuristic);
 
 /* An integrand on the unit cube: u holds `dimensions` numbers in [0,1). */
@@ -2282,8 +2282,8 @@ PTDEF double pt_mis_weight(double p1, double p2, pt_heuristic heuristic)
 {
     double r;
     if (!(p1 > 0)) return 0;
-    if (heuristic == PT_HEURISTIC_MAXIMUM) return p1 >= p2;
     if (p1 == p2) return 0.5; /* two infinite ones too */
+    if (heuristic == PT_HEURISTIC_MAXIMUM) return p1 > p2;
     r = p2 / p1;
     return heuristic == PT_HEURISTIC_POWER ? 1 / (1 + r * r) : 1 / (1 + r);
 }

@@ -1455,7 +1455,7 @@ static void agreement_scenes(void)
         pt_check(entry->make(&scene, &camera) == PT_OK, entry->name, "%s", pt_scene_error(&scene));
         check_agree(entry->name, &scene, &camera, PATH, LIGHT, seed, n, n, patient ? 0.02 : scenes[i].bound);
         if (i < 2 && patient)
-            check_agree(entry->name, &scene, &camera, PATH, PLAIN, seed + 2, n, 8 * n, 0.02);
+            check_agree(entry->name, &scene, &camera, PATH, PLAIN, seed + 2, n, 10 * n, 0.02);
         pt_scene_free(&scene);
     }
 }
@@ -1476,8 +1476,8 @@ static void agreement_glass_ball(void)
     pt_stats a[3], b[3];
     pt_check(pt_scene_glass_ball(&scene, &camera) == PT_OK, "pt_scene_glass_ball", "%s",
              pt_scene_error(&scene));
-    picture_means(&scene, &camera, NULL, PATH, 1040, pt_test_long() ? 65536 : 3072, tally_no_caustics, a);
-    picture_means(&scene, &camera, NULL, LIGHT, 1041, pt_test_long() ? 65536 : 3072, tally_no_caustics, b);
+    picture_means(&scene, &camera, NULL, PATH, 1040, pt_test_long() ? 98304 : 3072, tally_no_caustics, a);
+    picture_means(&scene, &camera, NULL, LIGHT, 1041, pt_test_long() ? 98304 : 3072, tally_no_caustics, b);
     pt_check_equal_means("glass ball without its caustic: path = light", &a[1], &b[1],
                          pt_test_long() ? 0.02 : 0.1, "shadows, or light seen in glass");
     pt_scene_free(&scene);
@@ -1497,7 +1497,7 @@ static void heuristics(void)
     options.roulette = PT_ROULETTE_NONE;
     for (k = 0; k < 3; k++) {
         options.heuristic = (pt_heuristic)k;
-        picture_means(&scene, &inside, &options, PATH, 1050 + (uint64_t)k, 1024, tally_reflected, s[k]);
+        picture_means(&scene, &inside, &options, PATH, 1050 + (uint64_t)k, 1536, tally_reflected, s[k]);
     }
     for (k = 1; k < 3; k++)
         pt_check_equal_means(label("power = %s heuristic", name[k]), &s[0][1], &s[k][1], 0.02,
