@@ -6406,7 +6406,7 @@ PTDEF void pt_report_print(const pt_report *report, FILE *file)
     int truth = report->row_count > 0 && report->rows[0].has_true_error;
     fprintf(file, "%s, %s sampler, %s body, %d x %d pixels, ", report->method ? report->method : "no render",
             report->sampler ? report->sampler : "no", report->body ? report->body : "no", report->width, report->height);
-    if (report->threads > 0) fprintf(file, "%d threads\n", report->threads);
+    if (report->threads > 0) fprintf(file, "%d thread%s\n", report->threads, report->threads == 1 ? "" : "s");
     else fprintf(file, "the caller's threads\n");
     fprintf(file, "       spp       CPU s      wall s     Mrays/s   est. RMSE  est. relMSE  efficiency%s\n",
             truth ? "   true RMSE true relMSE" : "");

@@ -922,12 +922,9 @@ static void direct_disk(void)
         pt_stats s = PT_STATS_INIT;
         disk_light disk = light[i];
         for (k = 0; k < UNITS; k++) {
-            const pt_integral integral = {disk_integrand,
-                                          &disk,
-                                          2,
-                                          pt_test_samples(512),
-                                          PT_SAMPLER_SOBOL,
-                                          pt_test_seed(480 + UNITS * (uint64_t)i + (uint64_t)k)};
+            const uint64_t seed = pt_test_seed(480 + UNITS * (uint64_t)i + (uint64_t)k);
+            const pt_integral integral = {
+                disk_integrand, &disk, 2, pt_test_samples(2048), PT_SAMPLER_SOBOL, seed};
             pt_estimate estimate;
             pt_estimate_mean(&integral, &estimate);
             pt_stats_add(&s, estimate.value);
@@ -1437,7 +1434,7 @@ static void agreement_scenes(void)
         char name[16];
         uint32_t paths, more;
         double bound;
-    } scenes[5] = {{"cornell", 2304, 16384, 0.02},
+    } scenes[5] = {{"cornell", 3072, 16384, 0.02},
                    {"cornell-empty", 1024, 16384, 0.02},
                    {"cornell-spheres", 2048, 32768, 0.1},
                    {"smallpt", 1536, 65536, 0.2},
@@ -1749,52 +1746,74 @@ typedef enum mistake {
     NO_ETA           /* radiance not scaled by eta^2 at refraction                                  */
 } mistake;
 
-/* Direct light at the hit from both techniques, grey. */
+/* A value and its weight by multiple importance sampling. */
+typedef struct weighted {
+    double value, weight;
+} weighted;
+
+/* Direct light at the hit by asking a point of a light, grey. */
+static weighted light_by_hand(const pt_scene *scene, const pt_hit *hit, const pt_bsdf *bsdf, pt_vec3 wo,
+                              double u_choice, pt_vec2 u, mistake wrong)
+{
+    weighted result = {0, 1};
+    pt_light_sample_result light;
+    double pmf, pdf, cosine;
+    const int which = pt_light_choose(scene, u_choice, &pmf);
+    pt_ray shadow;
+    if (wrong == NO_CHOICE) pmf = 1;
+    if (!pt_light_sample(scene, which, hit->p, u, &light)) return result;
+    cosine = wrong == NO_COSINE ? 1 : fabs((double)pt_v3_dot(light.wi, hit->ng));
+    pdf = wrong == AREA_AS_ANGLE ? 1 / scene->lights[which].area : (double)light.pdf_w;
+    shadow = pt_spawn_ray_to(hit->p, hit->p_error, hit->ng, light.p, light.p_error, light.n);
+    if (!pt_occluded(scene, &shadow))
+        result.value = (double)pt_bsdf_eval(bsdf, wo, light.wi, PT_RADIANCE, PT_LOBE_ALL).g * cosine *
+                       (double)light.radiance.g / (pdf * pmf);
+    result.weight = pt_mis_weight((double)light.pdf_w * pmf,
+                                  (double)pt_bsdf_pdf_w(bsdf, wo, light.wi, PT_RADIANCE), PT_HEURISTIC_POWER);
+    return result;
+}
+
+/* The same by following a direction of the BSDF. */
+static weighted bsdf_by_hand(const pt_scene *scene, const pt_hit *hit, const pt_bsdf *bsdf, pt_vec3 wo,
+                             pt_vec2 u)
+{
+    weighted result = {0, 1};
+    pt_bsdf_sample_result next;
+    pt_hit far_hit;
+    pt_ray ray;
+    if (!pt_bsdf_sample(bsdf, wo, 0, u, PT_RADIANCE, &next)) return result;
+    ray = pt_spawn_ray(hit->p, hit->p_error, hit->ng, next.wi);
+    if (!pt_intersect(scene, &ray, &far_hit) || far_hit.light < 0) return result;
+    result.value = (double)next.weight.g * (double)pt_hit_emission(scene, &far_hit, pt_v3_neg(next.wi)).g;
+    result.weight = pt_mis_weight((double)next.pdf_w,
+                                  (double)pt_light_pdf_w(scene, far_hit.light, hit->p, &far_hit) *
+                                      scene->lights[far_hit.light].pmf,
+                                  PT_HEURISTIC_POWER);
+    return result;
+}
+
+/* Direct light at the hit from both techniques, with a mistake. */
 static double direct_by_hand(const pt_scene *scene, const pt_hit *hit, pt_vec3 wo, pt_sampler *sampler,
                              mistake wrong)
 {
     const pt_bsdf bsdf = pt_bsdf_make(&scene->materials[hit->material], hit);
-    pt_light_sample_result light;
-    pt_bsdf_sample_result next;
-    double pmf, u_choice;
-    double by_light = 0, by_bsdf = 0, w_light = 1, w_bsdf = 1;
+    weighted by_light, by_bsdf;
     pt_vec2 u_light, u_bsdf;
-    int which;
+    double u_choice;
     pt_sampler_seek(sampler, PT_DIM_EDGE(1));
     u_bsdf = pt_sampler_2d(sampler);
     u_light = pt_sampler_2d(sampler);
     u_choice = (double)pt_sampler_1d(sampler);
-    which = pt_light_choose(scene, u_choice, &pmf);
-    if (wrong == NO_CHOICE) pmf = 1;
-    if (pt_light_sample(scene, which, hit->p, u_light, &light)) {
-        const double cosine = fabs((double)pt_v3_dot(light.wi, hit->ng));
-        const double pdf = wrong == AREA_AS_ANGLE ? 1 / scene->lights[which].area : (double)light.pdf_w;
-        const pt_ray shadow = pt_spawn_ray_to(hit->p, hit->p_error, hit->ng, light.p, light.p_error, light.n);
-        const double f = (double)pt_bsdf_eval(&bsdf, wo, light.wi, PT_RADIANCE, PT_LOBE_ALL).g;
-        if (!pt_occluded(scene, &shadow))
-            by_light = f * (wrong == NO_COSINE ? 1 : cosine) * (double)light.radiance.g / (pdf * (double)pmf);
-        w_light = pt_mis_weight((double)light.pdf_w * (double)pmf,
-                                (double)pt_bsdf_pdf_w(&bsdf, wo, light.wi, PT_RADIANCE), PT_HEURISTIC_POWER);
-    }
-    if (pt_bsdf_sample(&bsdf, wo, 0, u_bsdf, PT_RADIANCE, &next)) {
-        pt_hit far_hit;
-        const pt_ray ray = pt_spawn_ray(hit->p, hit->p_error, hit->ng, next.wi);
-        if (pt_intersect(scene, &ray, &far_hit) && far_hit.light >= 0) {
-            by_bsdf = (double)next.weight.g * (double)pt_hit_emission(scene, &far_hit, pt_v3_neg(next.wi)).g;
-            w_bsdf = pt_mis_weight((double)next.pdf_w,
-                                   (double)pt_light_pdf_w(scene, far_hit.light, hit->p, &far_hit) *
-                                       scene->lights[far_hit.light].pmf,
-                                   PT_HEURISTIC_POWER);
-        }
-    }
-    if (wrong == MEAN_OF_BOTH) w_light = w_bsdf = 0.5;
-    if (wrong == TWICE) w_light = w_bsdf = 1;
-    if (wrong == WEIGHTS_NOT_ONE) w_bsdf = 1;
+    by_light = light_by_hand(scene, hit, &bsdf, wo, u_choice, u_light, wrong);
+    by_bsdf = bsdf_by_hand(scene, hit, &bsdf, wo, u_bsdf);
+    if (wrong == MEAN_OF_BOTH) by_light.weight = by_bsdf.weight = 0.5;
+    if (wrong == TWICE) by_light.weight = by_bsdf.weight = 1;
+    if (wrong == WEIGHTS_NOT_ONE) by_bsdf.weight = 1;
     if (wrong == AREA_AS_ANGLE || wrong == NO_COSINE || wrong == NO_CHOICE) {
-        w_light = 1;
-        w_bsdf = 0;
+        by_light.weight = 1;
+        by_bsdf.weight = 0;
     }
-    return w_light * by_light + w_bsdf * by_bsdf;
+    return by_light.weight * by_light.value + by_bsdf.weight * by_bsdf.value;
 }
 
 /* The furnace with a hand-written roulette, and the lamp under water without light sampling. */
