@@ -20,7 +20,7 @@
            pt_report report = PT_REPORT_INIT;
            pt_render_desc desc = pt_render_defaults();
 
-           int white = pt_add_material(&scene, pt_material_diffuse(pt_rgb_grey(0.7f)));
+           int white = pt_add_material(&scene, pt_material_diffuse(pt_rgb_grey(0.75)));
            int lamp = pt_add_material(&scene, pt_material_emitter(pt_rgb_grey(10)));
            pt_add_sphere(&scene, pt_v3(0, 1, 0), 1, white);
            pt_add_parallelogram(&scene, pt_v3(-4, 0, -4), pt_v3(0, 0, 8), pt_v3(8, 0, 0), white);
@@ -2955,11 +2955,19 @@ PTDEF double pt_irradiance_disk(double radiance, double r, double h, double offs
     return 2 * PT_PI * radiance * r * r * h * h / (root * (root + a - r * r));
 }
 
+/* x (sqrt(1+y^2) atan(x / sqrt(1+y^2)) - atan(x)) without cancellation for small x and y: the difference of
+   two arcs by one, and m = sqrt(1+y^2) - 1 multiplied out. */
+static double pti_parallel_term(double x, double y)
+{
+    double y1 = sqrt(1 + y * y), m = y * y / (1 + y1);
+    return x * (m * atan(x / y1) - atan(x * m / (y1 + x * x)));
+}
+
 PTDEF double pt_form_factor_parallel(double a, double b, double c)
 {
-    double x = a / c, y = b / c, x1 = sqrt(1 + x * x), y1 = sqrt(1 + y * y);
-    return 2 / (PT_PI * x * y) * (log(x1 * y1 / sqrt(1 + x * x + y * y)) + x * y1 * atan(x / y1) + y * x1 * atan(y / x1) -
-                                  x * atan(x) - y * atan(y));
+    double x = a / c, y = b / c;
+    return 2 / (PT_PI * x * y) *
+           (0.5 * log1p(x * x * y * y / (1 + x * x + y * y)) + pti_parallel_term(x, y) + pti_parallel_term(y, x));
 }
 
 PTDEF double pt_form_factor_perpendicular(double w, double h, double l)
@@ -3185,6 +3193,7 @@ typedef struct pti_ray {
     double o[3], d[3];
     int kx, ky, kz;         /* the axes, z the longest of d                                                */
     double sx, sy, sz;      /* shear and scale that take d to (0,0,1)                                      */
+    double end;             /* tmax: what may lie at it, or beyond it by rounding, is not hit              */
     pt_real origin[3], inverse[3]; /* for boxes; 1/0 = infinity                                            */
 } pti_ray;
 
@@ -3192,6 +3201,7 @@ static pti_ray pti_ray_make(const pt_ray *ray)
 {
     pti_ray r;
     int k;
+    r.end = ray->tmax < PTI_REAL_MAX ? (double)ray->tmax : HUGE_VAL;
     r.origin[0] = ray->o.x; r.origin[1] = ray->o.y; r.origin[2] = ray->o.z;
     r.inverse[0] = 1 / ray->d.x; r.inverse[1] = 1 / ray->d.y; r.inverse[2] = 1 / ray->d.z;
     r.o[0] = (double)ray->o.x; r.o[1] = (double)ray->o.y; r.o[2] = (double)ray->o.z;
@@ -3250,7 +3260,7 @@ PTI_INLINE int pti_triangle(const pti_ray *r, pt_vec3 v0, pt_vec3 v1, pt_vec3 v2
                             double *b1, double *b2)
 {
     pti_d3 a = pti_shear(r, v0), b = pti_shear(r, v1), c = pti_shear(r, v2);
-    double u = pti_edge(c.x, b.y, c.y, b.x), v = pti_edge(a.x, c.y, a.y, c.x), w, det, depth, p, q;
+    double u = pti_edge(c.x, b.y, c.y, b.x), v = pti_edge(a.x, c.y, a.y, c.x), w, det, depth, p, q, error;
     if ((u < 0 && v > 0) || (u > 0 && v < 0)) return 0;
     w = pti_edge(b.x, a.y, b.y, a.x);
     if ((u < 0 || v < 0 || w < 0) && (u > 0 || v > 0 || w > 0)) return 0;
@@ -3264,7 +3274,9 @@ PTI_INLINE int pti_triangle(const pti_ray *r, pt_vec3 v0, pt_vec3 v1, pt_vec3 v2
     PTI_FENCE(depth);
     depth += p + q;
     if (!(depth / det > 0 && depth / det < tmax)) return 0; /* NaN misses */
-    if (!(fabs(depth) > pti_depth_error(r, a, b, c, u, v, w))) return 0; /* the origin may lie on it */
+    error = pti_depth_error(r, a, b, c, u, v, w);
+    if (!(fabs(depth) > error)) return 0; /* the origin may lie on it, */
+    if (!(fabs(depth) + error < r->end * fabs(det))) return 0; /* or the end of a shadow ray */
     *t = depth / det;
     *b1 = v / det;
     *b2 = w / det;
@@ -3306,13 +3318,13 @@ PTI_INLINE int pti_sphere(const pti_ray *r, pt_vec3 centre, double radius, doubl
 {
     pti_d3 d = pti_d(r->d[0], r->d[1], r->d[2]);
     pti_d3 f = pti_d_sub(pti_d(r->o[0], r->o[1], r->o[2]), pti_d_from(centre));
-    double a = pti_d_dot(d, d), b = -pti_d_dot(f, d), l, root, q, c, t0, t1;
+    double a = pti_d_dot(d, d), b = -pti_d_dot(f, d), l, root, q, c, length, t0, t1;
     l = pti_d_length(pti_d_add(f, pti_d_scale(d, b / a)));
     if (!(l <= radius)) return 0;
     root = sqrt(a * (radius - l) * (radius + l));
     q = b + copysign(root, b);
-    c = pti_d_length(f);
-    c = (c - radius) * (c + radius);
+    length = pti_d_length(f);
+    c = (length - radius) * (length + radius);
     if (q == 0) return 0; /* both roots are 0: a tangent at the origin */
     t0 = c / q;
     t1 = q / a;
@@ -3323,6 +3335,8 @@ PTI_INLINE int pti_sphere(const pti_ray *r, pt_vec3 centre, double radius, doubl
     }
     if (!(t0 > 0)) t0 = t1;
     if (!(t0 > 0 && t0 < tmax)) return 0;
+    /* the end of a shadow ray may lie on it: 16 roundings of the distances that went into t0 */
+    if (!(t0 + 16 * PTI_2_M53 * (length + radius) / sqrt(a) < r->end)) return 0;
     *t = t0;
     return 1;
 }

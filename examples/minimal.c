@@ -8,7 +8,7 @@ int main(void)
     pt_report report = PT_REPORT_INIT;
     pt_render_desc desc = pt_render_defaults();
 
-    int white = pt_add_material(&scene, pt_material_diffuse(pt_rgb_grey(0.7f)));
+    int white = pt_add_material(&scene, pt_material_diffuse(pt_rgb_grey(0.75)));
     int lamp = pt_add_material(&scene, pt_material_emitter(pt_rgb_grey(10)));
     pt_add_sphere(&scene, pt_v3(0, 1, 0), 1, white);
     pt_add_parallelogram(&scene, pt_v3(-4, 0, -4), pt_v3(0, 0, 8), pt_v3(8, 0, 0), white);
