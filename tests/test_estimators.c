@@ -1258,7 +1258,7 @@ static void maximum_heuristic(void)
     const pt_heuristic h = PT_HEURISTIC_MAXIMUM;
     pt_check(pt_mis_weight(2, 1, h) == 1 && pt_mis_weight(1, 2, h) == 0, "maximum heuristic",
              "all to the larger density");
-    pt_check(pt_mis_weight(1, 1, h) == 1, "maximum heuristic", "of equal densities the first takes all");
+    pt_check(pt_mis_weight(1, 1, h) > 0.49 && pt_mis_weight(1, 1, h) < 0.51, "maximum heuristic", "equal densities share");
     pt_check(pt_mis_weight(0, 0, h) == 0 && pt_mis_weight(0, 1, h) == 0, "maximum heuristic",
              "density 0 gives 0");
 }
