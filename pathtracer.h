@@ -3245,7 +3245,7 @@ PTI_INLINE pti_d3 pti_shear(const pti_ray *r, pt_vec3 v)
    origin on the plane of the triangle may come out in front of it by no more than this. Relative errors, in
    units of e = 2^-53: z 3 (difference, reciprocal, product), x and y 5 of their own and the sheared-off part,
    an edge function 2 and what x and y bring in, the sum 3. */
-PTI_INLINE double pti_depth_error(const pti_ray *r, pti_d3 a, pti_d3 b, pti_d3 c, double u, double v, double w)
+static double pti_depth_error(const pti_ray *r, pti_d3 a, pti_d3 b, pti_d3 c, double u, double v, double w)
 {
     const double e = PTI_2_M53 * (1 + 16 * PTI_2_M53);
     double x = fmax(fabs(a.x), fmax(fabs(b.x), fabs(c.x))), y = fmax(fabs(a.y), fmax(fabs(b.y), fabs(c.y)));
@@ -3295,7 +3295,7 @@ PTI_INLINE void pti_parallelogram_corners(const pt_parallelogram *s, pt_vec3 v[4
 
 /* A parallelogram is two triangles that share the diagonal from the corner; u and v are the weights of its
    edges, u >= v in the first triangle. */
-PTI_INLINE int pti_parallelogram(const pti_ray *r, const pt_vec3 c[4], double tmax, double *t, double *u, double *v)
+static int pti_parallelogram(const pti_ray *r, const pt_vec3 c[4], double tmax, double *t, double *u, double *v)
 {
     double b1, b2;
     if (pti_triangle(r, c[0], c[1], c[2], tmax, t, &b1, &b2)) {
@@ -3314,7 +3314,7 @@ PTI_INLINE int pti_parallelogram(const pti_ray *r, const pt_vec3 c[4], double tm
 /* [Hai19]: with f = o - c and b = -f.d, the foot of the perpendicular is l = f + (b/a) d, and the
    discriminant is a (r - |l|)(r + |l|). The root that would cancel comes from the product of both,
    (|f| - r)(|f| + r). */
-PTI_INLINE int pti_sphere(const pti_ray *r, pt_vec3 centre, double radius, double tmax, double *t)
+static int pti_sphere(const pti_ray *r, pt_vec3 centre, double radius, double tmax, double *t)
 {
     pti_d3 d = pti_d(r->d[0], r->d[1], r->d[2]);
     pti_d3 f = pti_d_sub(pti_d(r->o[0], r->o[1], r->o[2]), pti_d_from(centre));
