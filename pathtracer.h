@@ -1701,7 +1701,6 @@ static void pti_parallel(int threads, int count, void (*task)(void *, int), void
 #define pti_cos cos
 #define pti_fabs fabs
 #define pti_copysign copysign
-#define pti_floor floor
 #define PTI_REAL_MAX 1.7976931348623157e308
 #define PTI_UNIT_ROUNDOFF PTI_2_M53
 #else
@@ -1710,7 +1709,6 @@ static void pti_parallel(int threads, int count, void (*task)(void *, int), void
 #define pti_cos cosf
 #define pti_fabs fabsf
 #define pti_copysign copysignf
-#define pti_floor floorf
 #define PTI_REAL_MAX 3.40282346638528860e38f
 #define PTI_UNIT_ROUNDOFF PTI_2_M24
 #endif
@@ -5388,7 +5386,6 @@ PTI_INLINE int pti_extend(pti_walk *w, const pt_bsdf *bsdf, pt_vec3 wo, const un
     double u_lobe = 0;
     pt_sampler_seek(w->sampler, dimension + PT_DIM_BSDF);
     u = pt_sampler_2d(w->sampler);
-    s.eta = 1;
     if (features & PTI_WITH_SPECULAR) {
         if (bsdf->material->kind != PT_MATERIAL_DIFFUSE) {
             pt_sampler_seek(w->sampler, dimension + PT_DIM_LOBE);

@@ -257,4 +257,23 @@ static inline void pt_test_judge_chi2(const char *name, const double *observed, 
 #define pt_check_rejects_chi2(name, observed, expected, cells, hint) \
     pt_test_judge_chi2(name, observed, expected, cells, 1, hint)
 
+#if defined(__GNUC__)
+#define PT_TEST_LABEL __attribute__((format(printf, 1, 2)))
+#else
+#define PT_TEST_LABEL
+#endif
+
+/* A name put together; holds for the next three calls. */
+PT_TEST_LABEL static inline const char *label(const char *format, ...)
+{
+    static char ring[4][160];
+    static int next;
+    char *const text = ring[next++ % 4];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(text, sizeof ring[0], format, arguments);
+    va_end(arguments);
+    return text;
+}
+
 #endif /* PT_TEST_H */

@@ -8,25 +8,6 @@
 #define PATHTRACER_IMPLEMENTATION
 #include "pt_test.h"
 
-#if defined(__GNUC__)
-#define LABEL_FORMAT __attribute__((format(printf, 1, 2)))
-#else
-#define LABEL_FORMAT
-#endif
-
-/* A name put together; holds for the next three calls. */
-LABEL_FORMAT static const char *label(const char *format, ...)
-{
-    static char ring[4][128];
-    static int next;
-    char *const text = ring[next++ % 4];
-    va_list arguments;
-    va_start(arguments, format);
-    vsnprintf(text, sizeof ring[0], format, arguments);
-    va_end(arguments);
-    return text;
-}
-
 static pt_rgb grey(double v) { return pt_rgb_grey((pt_real)v); }
 
 /* ---- renders ---------------------------------------------------------------------------------------- */

@@ -18,25 +18,6 @@ static void pool_free(void *pointer, void *user);
 #include "pt_test.h"
 #include <limits.h>
 
-#if defined(__GNUC__)
-#define LABEL_FORMAT __attribute__((format(printf, 1, 2)))
-#else
-#define LABEL_FORMAT
-#endif
-
-/* A name put together; holds for the next three calls. */
-LABEL_FORMAT static const char *label(const char *format, ...)
-{
-    static char ring[4][160];
-    static int next;
-    char *const text = ring[next++ % 4];
-    va_list arguments;
-    va_start(arguments, format);
-    vsnprintf(text, sizeof ring[0], format, arguments);
-    va_end(arguments);
-    return text;
-}
-
 /* ---- memory that counts and fails ------------------------------------------------------------------- */
 
 /* Before each block: how large it is, and whose. */

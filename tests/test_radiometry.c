@@ -113,7 +113,7 @@ static double dot(pt_vec3 a, pt_vec3 b)
    53 and 32. */
 static double rounding(void) { return is_float() ? 1e-6 : 1e-9; }
 
-static const char *label(const char *id, const char *what)
+static const char *row_label(const char *id, const char *what)
 {
     static char text[96];
     snprintf(text, sizeof text, "%s %s", id, what);
@@ -251,11 +251,11 @@ static double by_hemisphere(const void *user, pt_sampler *s)
 /* All three; error: relative, of the scene's geometry. */
 static void check_irradiance(const char *id, const receiver *at, uint32_t points, double exact, double error)
 {
-    check_bound(label(id, "by lights"), by_light, at, points, exact, error, BOUND,
+    check_bound(row_label(id, "by lights"), by_light, at, points, exact, error, BOUND,
                 "irradiance by pt_light_sample");
-    check_hits(label(id, "by cosine"), by_cosine, at, exact, exact / PT_PI, error,
+    check_hits(row_label(id, "by cosine"), by_cosine, at, exact, exact / PT_PI, error,
                "irradiance by pt_warp_cosine");
-    check_hits(label(id, "by hemisphere"), by_hemisphere, at, exact, 0.5 * exact / PT_PI, error,
+    check_hits(row_label(id, "by hemisphere"), by_hemisphere, at, exact, 0.5 * exact / PT_PI, error,
                "irradiance by pt_warp_hemisphere");
 }
 
@@ -285,9 +285,9 @@ static void check_lamp(const row *r, pt_scene *scene)
     commit(scene);
     for (i = 0; i < 9; i++) {
         const int found = pt_light_sample(scene, 0, at.p, pt_v2(u[i / 3], u[i % 3]), &l);
-        near_relative(label(r->id, "1 / pdf_w"), found ? 1 / l.pdf_w : 0, r->value, 1e-13);
+        near_relative(row_label(r->id, "1 / pdf_w"), found ? 1 / l.pdf_w : 0, r->value, 1e-13);
     }
-    check_hits(label(r->id, "by hits"), by_sphere, &at, r->value, r->value / (4 * PT_PI), 0,
+    check_hits(row_label(r->id, "by hits"), by_sphere, &at, r->value, r->value / (4 * PT_PI), 0,
                "solid angle by pt_warp_sphere");
     pt_scene_free(scene);
 }
@@ -298,14 +298,14 @@ static void solid_angles_of_spheres(void)
     int at;
     for (at = 0; (r = next_row("RAD-CAP", NULL, &at)) != NULL;) {
         const double a = degrees(parameter(r, "a_deg")), s = sin(a / 2);
-        near_relative(label(r->id, "closed"), pt_solid_angle_cap(a), r->value, 1e-15);
-        near_relative(label(r->id, "density of the cone"), 1 / pt_warp_cone_pdf_w(2 * s * s), r->value,
+        near_relative(row_label(r->id, "closed"), pt_solid_angle_cap(a), r->value, 1e-15);
+        near_relative(row_label(r->id, "density of the cone"), 1 / pt_warp_cone_pdf_w(2 * s * s), r->value,
                       1e-15);
     }
     for (at = 0; (r = next_row("RAD-SPH", NULL, &at)) != NULL;) {
         const double radius = parameter(r, "R"), d = parameter(r, "d");
         pt_scene scene = PT_SCENE_INIT;
-        near_relative(label(r->id, "closed"), pt_solid_angle_cap(asin(radius / d)), r->value, 1e-15);
+        near_relative(row_label(r->id, "closed"), pt_solid_angle_cap(asin(radius / d)), r->value, 1e-15);
         pt_add_sphere(&scene, v3(0, 0, d), real(radius), lamp(&scene, 1));
         check_lamp(r, &scene);
     }
@@ -323,7 +323,7 @@ static void directions_in_caps(void)
     int at = 0;
     while ((r = next_row("RAD-CAP", NULL, &at)) != NULL) {
         const double c = cos(degrees(parameter(r, "a_deg")));
-        check_hits(label(r->id, "by directions"), in_cap, &c, r->value, r->value / (4 * PT_PI), 0,
+        check_hits(row_label(r->id, "by directions"), in_cap, &c, r->value, r->value / (4 * PT_PI), 0,
                    "pt_warp_sphere is not uniform");
     }
 }
@@ -351,9 +351,9 @@ static void solid_angles_of_flat_shapes(void)
             numbers(r, corner[i], n, 3);
             v[i] = hundredfold(n);
         }
-        near_relative(label(r->id, "closed"), pt_solid_angle_triangle(o, v[0], v[1], v[2]), r->value, 2e-15);
-        near_relative(label(r->id, "turned"), pt_solid_angle_triangle(o, v[2], v[1], v[0]), r->value, 2e-15);
-        near_relative(label(r->id, "polygon"), pt_solid_angle_polygon(o, v, 3), r->value, 2e-15);
+        near_relative(row_label(r->id, "closed"), pt_solid_angle_triangle(o, v[0], v[1], v[2]), r->value, 2e-15);
+        near_relative(row_label(r->id, "turned"), pt_solid_angle_triangle(o, v[2], v[1], v[0]), r->value, 2e-15);
+        near_relative(row_label(r->id, "polygon"), pt_solid_angle_polygon(o, v, 3), r->value, 2e-15);
         add_facing(&scene, v[0], v[1], v[2], lamp(&scene, 1));
         check_lamp(r, &scene);
     }
@@ -364,8 +364,8 @@ static void solid_angles_of_flat_shapes(void)
         const pt_vec3 v[4] = {a, pt_v3(c.x, a.y, a.z), c, pt_v3(a.x, c.y, a.z)};
         const pt_vec3 ex = pt_v3_sub(v[1], a), ey = pt_v3_sub(v[3], a);
         pt_scene scene = PT_SCENE_INIT;
-        near_relative(label(r->id, "closed"), pt_solid_angle_rectangle(o, a, ex, ey), r->value, 1e-14);
-        near_relative(label(r->id, "polygon"), pt_solid_angle_polygon(o, v, 4), r->value, 1e-14);
+        near_relative(row_label(r->id, "closed"), pt_solid_angle_rectangle(o, a, ex, ey), r->value, 1e-14);
+        near_relative(row_label(r->id, "polygon"), pt_solid_angle_polygon(o, v, 4), r->value, 1e-14);
         pt_add_parallelogram(&scene, a, ey, ex, lamp(&scene, 1));
         check_lamp(r, &scene);
     }
@@ -420,11 +420,11 @@ static void disks(void)
         pt_scene scene = PT_SCENE_INIT;
         below.p.x = real(d.offset);
         below.scene = &scene;
-        near_relative(label(r->id, "closed"), pt_solid_angle_disk(d.r, d.h, d.offset), r->value, 2e-15);
-        check(label(r->id, "by area"), disk_solid_angle, &d, r->value, 0, "cos / d^2 over pt_warp_disk");
+        near_relative(row_label(r->id, "closed"), pt_solid_angle_disk(d.r, d.h, d.offset), r->value, 2e-15);
+        check(row_label(r->id, "by area"), disk_solid_angle, &d, r->value, 0, "cos / d^2 over pt_warp_disk");
         add_disk(&scene, d.r, d.h, 0, lamp(&scene, 1));
         commit(&scene);
-        check_hits(label(r->id, "by hits"), by_sphere, &below, r->value, r->value / (4 * PT_PI), 1e-5,
+        check_hits(row_label(r->id, "by hits"), by_sphere, &below, r->value, r->value / (4 * PT_PI), 1e-5,
                    "solid angle by pt_warp_sphere");
         pt_scene_free(&scene);
     }
@@ -434,8 +434,8 @@ static void disks(void)
         pt_scene scene = PT_SCENE_INIT;
         below.p.x = real(d.offset);
         below.scene = &scene;
-        near_relative(label(r->id, "closed"), pt_irradiance_disk(1, d.r, d.h, d.offset), r->value, 3e-15);
-        check_bound(label(r->id, "by area"), disk_irradiance, &d, d.h < 0.5 ? 16 * POINTS : POINTS, r->value,
+        near_relative(row_label(r->id, "closed"), pt_irradiance_disk(1, d.r, d.h, d.offset), r->value, 3e-15);
+        check_bound(row_label(r->id, "by area"), disk_irradiance, &d, d.h < 0.5 ? 16 * POINTS : POINTS, r->value,
                     0, BOUND, "cos cos / d^2 over pt_warp_disk");
         add_disk(&scene, d.r, d.h, 0, lamp(&scene, 1));
         commit(&scene);
@@ -462,12 +462,12 @@ static void point_lights(void)
         const pt_vec3 n = v3(sin(theta), cos(theta), 0);
         pt_light_sample_result l;
         pt_scene scene = PT_SCENE_INIT;
-        near_relative(label(r->id, "closed"), pt_irradiance_point(i, d, cos(theta)), r->value, 1e-15);
+        near_relative(row_label(r->id, "closed"), pt_irradiance_point(i, d, cos(theta)), r->value, 1e-15);
         pt_check(pt_irradiance_point(i, d, -cos(theta)) == 0, r->id, "light from below the horizon counts");
         pt_add_point_light(&scene, v3(0, d, 0), grey(i));
         commit(&scene);
         pt_light_sample(&scene, 0, v3(0, 0, 0), pt_v2(0, 0), &l);
-        near_relative(label(r->id, "by lights"), (double)l.radiance.g * dot(n, l.wi) / l.pdf_w, r->value,
+        near_relative(row_label(r->id, "by lights"), (double)l.radiance.g * dot(n, l.wi) / l.pdf_w, r->value,
                       6 * pt_gamma(1));
         pt_scene_free(&scene);
     }
@@ -504,16 +504,16 @@ static void spots(void)
         /* any falloff that is odd about its middle has the same power: 1/4 of the way up it is 5/32 */
         for (k = -1; k < 6; k++) {
             const double x = 0.25 * k, c = lit.cos_end + x * (lit.cos_start - lit.cos_end);
-            pt_check_near(label(r->id, "falloff"), pt_spot_falloff(c, lit.cos_start, lit.cos_end),
+            pt_check_near(row_label(r->id, "falloff"), pt_spot_falloff(c, lit.cos_start, lit.cos_end),
                           falloff[k + 1], 1e-13, "see pt_spot_falloff");
         }
-        near_relative(label(r->id, "closed"), pt_flux_spot(intensity, lit.cos_start, lit.cos_end), r->value,
+        near_relative(row_label(r->id, "closed"), pt_flux_spot(intensity, lit.cos_start, lit.cos_end), r->value,
                       1e-14);
         pt_add_point_light(&scene, v3(0.5, -0.25, 1), grey(intensity));
         commit(&scene);
         lit.scene = &scene;
         /* 1 - cos of 12 degrees, computed from a cosine, and cosines of single precision in its falloff */
-        check(label(r->id, "through a sphere"), flux_through_sphere, &lit, r->value, is_float() ? 1e-5 : 0,
+        check(row_label(r->id, "through a sphere"), flux_through_sphere, &lit, r->value, is_float() ? 1e-5 : 0,
               "pt_spot_falloff or the point light");
         pt_scene_free(&scene);
     }
@@ -529,7 +529,7 @@ static void sphere_lights(void)
         pt_scene scene = PT_SCENE_INIT;
         receiver below = {NULL, {0, 0, 0}, {0, 0, 1}};
         /* cos(90 degrees) is 6e-17 here, and E at a small sphere near the horizon has a slope of 1 / cos */
-        near_relative(label(r->id, "closed"), pt_irradiance_sphere(1, radius, d, cos(beta)), r->value, 1e-13);
+        near_relative(row_label(r->id, "closed"), pt_irradiance_sphere(1, radius, d, cos(beta)), r->value, 1e-13);
         below.scene = &scene;
         pt_add_sphere(&scene, v3(d * sin(beta), 0, d * cos(beta)), real(radius), lamp(&scene, 1));
         commit(&scene);
@@ -573,7 +573,7 @@ static void polygon_lights(void)
         int i, parallel = count == 4;
         for (i = 0; i < count; i++) corners[i] = hundredfold(v[i]);
         for (i = 0; i < 3 && count == 4; i++) parallel &= v[0][i] + v[2][i] - v[1][i] - v[3][i] == 0;
-        near_relative(label(r->id, "closed"),
+        near_relative(row_label(r->id, "closed"),
                       pt_irradiance_polygon(1, v3(0, 0, 0), v3(0, 0, 1), corners, count), r->value, 3e-15);
         check_polygon(r, (const double(*)[3])v, count, 0);
         if (parallel) check_polygon(r, (const double(*)[3])v, count, 1);
@@ -601,9 +601,9 @@ static void regular_polygons(void)
             sum += pt_irradiance_polygon(1, v3(0, 0, 0), v3(0, 0, 1), triangle, 3);
             add_facing(&scene, triangle[0], triangle[1], triangle[2], material);
         }
-        near_relative(label(r->id, "triangles"), sum, r->value, tolerance);
+        near_relative(row_label(r->id, "triangles"), sum, r->value, tolerance);
         if (n <= 32)
-            near_relative(label(r->id, "closed"), pt_irradiance_polygon(1, v3(0, 0, 0), v3(0, 0, 1), v, n),
+            near_relative(row_label(r->id, "closed"), pt_irradiance_polygon(1, v3(0, 0, 0), v3(0, 0, 1), v, n),
                           r->value, tolerance);
         commit(&scene);
         below.scene = &scene;
@@ -648,17 +648,17 @@ static void skies(void)
         k.mean = mean;
         k.cosine = strcmp(r->quantity, "Var_cosine") == 0;
         if (!variance) {
-            check_bound(label(r->id, "uniform directions"), sky_value, &k, points, r->value, 0, BOUND,
+            check_bound(row_label(r->id, "uniform directions"), sky_value, &k, points, r->value, 0, BOUND,
                         "pt_warp_hemisphere");
             k.cosine = 1;
-            check_bound(label(r->id, "cosine-weighted"), sky_value, &k, points, r->value, 0, BOUND,
+            check_bound(row_label(r->id, "cosine-weighted"), sky_value, &k, points, r->value, 0, BOUND,
                         "pt_warp_cosine");
         } else if (r->value > 0) {
-            check_bound(label(r->id, r->quantity), sky_deviation, &k, points, r->value, 0, BOUND,
+            check_bound(row_label(r->id, r->quantity), sky_deviation, &k, points, r->value, 0, BOUND,
                         "the variance of one value");
         } else {
             const pt_stats s = estimate(r->id, sky_deviation, &k, POINTS);
-            pt_check_near(label(r->id, r->quantity), s.mean, 0, pow(8 * PT_PI * pt_gamma(1), 2),
+            pt_check_near(row_label(r->id, r->quantity), s.mean, 0, pow(8 * PT_PI * pt_gamma(1), 2),
                           "a uniform sky under cosine-weighted directions has no variance");
         }
     }
@@ -703,13 +703,13 @@ static void bulb(const row *r, double intensity)
     const double radius = 0.03, flux = parameter(r, "Phi_lm"), d = 2;
     pt_scene scene = PT_SCENE_INIT;
     receiver below = {NULL, {0, 0, 0}, {0, 1, 0}};
-    near_relative(label(r->id, "closed"), pt_exitance(r->value) * 4 * PT_PI * radius * radius, flux, 1e-15);
-    near_relative(label(r->id, "illuminance"), pt_irradiance_sphere(r->value, radius, d, 1),
+    near_relative(row_label(r->id, "closed"), pt_exitance(r->value) * 4 * PT_PI * radius * radius, flux, 1e-15);
+    near_relative(row_label(r->id, "illuminance"), pt_irradiance_sphere(r->value, radius, d, 1),
                   pt_irradiance_point(intensity, d, 1), 1e-14);
     pt_add_sphere(&scene, v3(0, d, 0), real(radius), lamp(&scene, r->value));
     commit(&scene);
     below.scene = &scene;
-    check(label(r->id, "by lights"), by_light, &below, intensity / (d * d), 1e-6,
+    check(row_label(r->id, "by lights"), by_light, &below, intensity / (d * d), 1e-6,
           "lx under a bulb of so many lm");
     pt_scene_free(&scene);
 }
@@ -728,9 +728,9 @@ static void photometry(void)
         const double flux = parameter(r, "Phi_lm");
         if (strcmp(r->quantity, "I_cd") == 0) {
             intensity = r->value;
-            near_relative(label(r->id, "closed"), pt_flux_point(r->value), flux, 1e-15);
+            near_relative(row_label(r->id, "closed"), pt_flux_point(r->value), flux, 1e-15);
         } else if (strcmp(r->quantity, "W_at_540THz") == 0) {
-            near_relative(label(r->id, "closed"), flux / (PT_LUMENS_PER_WATT * bar[1]), r->value, 1e-5);
+            near_relative(row_label(r->id, "closed"), flux / (PT_LUMENS_PER_WATT * bar[1]), r->value, 1e-5);
         } else {
             bulb(r, intensity);
         }
@@ -805,7 +805,7 @@ static void black_bodies(void)
             near_relative(r->id, pt_blackbody(peak(t), t) * 1e9, r->value, 2e-14);
         } else {
             near_relative(r->id, integrated_band(t, 360, 830) / exitance, r->value, 1e-12);
-            check(label(r->id, "by wavelengths"), one_wavelength, &t, r->value * exitance, 0,
+            check(row_label(r->id, "by wavelengths"), one_wavelength, &t, r->value * exitance, 0,
                   "see pt_blackbody");
         }
     }
@@ -823,7 +823,7 @@ static void luminous_efficacy(void)
             pt_cie_xyz(360 + 0.01 * i, bar);
             sum += bar[1] * pt_blackbody(360 + 0.01 * i, t) * 0.01;
         }
-        near_relative(label(r->id, "efficacy"), pt_blackbody_efficacy(t), 683.002 * PT_PI * sum / r->value,
+        near_relative(row_label(r->id, "efficacy"), pt_blackbody_efficacy(t), 683.002 * PT_PI * sum / r->value,
                       1e-4);
     }
     pt_check_near("a light bulb of 2700 K", pt_blackbody_efficacy(2700), 12.4, 0.1, "lm/W");
@@ -843,14 +843,14 @@ static void colours(void)
         const int axis = r->quantity[0] - 'X';
         xyz[axis] = r->value;
         if (axis == 1)
-            pt_check_near(label(r->id, "luminance"), pt_luminance(band == 'R', band == 'G', band == 'B'),
+            pt_check_near(row_label(r->id, "luminance"), pt_luminance(band == 'R', band == 'G', band == 'B'),
                           r->value, unit * r->value, "see pt_luminance");
         if (axis == 2) {
             const pt_rgbd c = pt_xyz_to_rgb(xyz);
             const double got[3] = {c.r, c.g, c.b};
             int k;
             for (k = 0; k < 3; k++)
-                pt_check_near(label(r->id, "to linear sRGB"), got[k], bands[k] == band, 2 * unit,
+                pt_check_near(row_label(r->id, "to linear sRGB"), got[k], bands[k] == band, 2 * unit,
                               "see pt_xyz_to_rgb");
         }
     }
@@ -893,9 +893,9 @@ static void check_form_factor(const row *r, patch from, pt_vec3 corner, pt_vec3 
     pt_add_parallelogram(&scene, corner, edge1, edge2, lamp(&scene, 1));
     commit(&scene);
     from.scene = &scene;
-    check_hits(label(r->id, "rays"), arrive, &from, r->value, r->value, 0,
+    check_hits(row_label(r->id, "rays"), arrive, &from, r->value, r->value, 0,
                "cosine-weighted rays that arrive");
-    check_bound(label(r->id, "by lights"), arrive_by_light, &from, 2 * POINTS, r->value, 0, BOUND,
+    check_bound(row_label(r->id, "by lights"), arrive_by_light, &from, 2 * POINTS, r->value, 0, BOUND,
                 "irradiance / pi by pt_light_sample");
     pt_scene_free(&scene);
 }
@@ -917,14 +917,14 @@ static void rectangles(void)
     near_relative("squares far apart", 1e12 * PT_PI * pt_form_factor_parallel(1, 1, 1e6), 1, 1e-11);
     for (at = 0; (r = next_row("VF-PAR", "F12", &at)) != NULL;) {
         const double a = parameter(r, "a"), b = parameter(r, "b"), c = parameter(r, "c");
-        near_relative(label(r->id, "closed"), pt_form_factor_parallel(a, b, c), r->value,
+        near_relative(row_label(r->id, "closed"), pt_form_factor_parallel(a, b, c), r->value,
                       2e-14);
         check_form_factor(r, on_floor(0, a, 0, b), v3(0, c, 0), v3(a, 0, 0), v3(0, 0, b));
     }
     for (at = 0; (r = next_row("VF-PERP", "F12", &at)) != NULL;) {
         const double w = parameter(r, "w"), h = parameter(r, "h"), l = parameter(r, "l");
-        near_relative(label(r->id, "closed"), pt_form_factor_perpendicular(w, h, l), r->value, 2e-14);
-        near_relative(label(r->id, "reciprocity"), pt_form_factor_perpendicular(h, w, l) * h / w, r->value,
+        near_relative(row_label(r->id, "closed"), pt_form_factor_perpendicular(w, h, l), r->value, 2e-14);
+        near_relative(row_label(r->id, "reciprocity"), pt_form_factor_perpendicular(h, w, l) * h / w, r->value,
                       2e-14);
         check_form_factor(r, on_floor(0, w, 0, l), v3(0, 0, 0), v3(0, h, 0), v3(0, 0, l));
     }
@@ -952,7 +952,7 @@ static void rectangles_in_general_position(void)
         double a[4], b[4];
         numbers(r, "A1", a, 4);
         numbers(r, "A2", b, 4);
-        near_relative(label(r->id, "closed"), parallel_in_general(a, b, c), r->value, 1e-12);
+        near_relative(row_label(r->id, "closed"), parallel_in_general(a, b, c), r->value, 1e-12);
         check_form_factor(r, on_floor(a[0], a[1], a[2], a[3]), v3(b[0], c, b[2]), v3(b[1] - b[0], 0, 0),
                           v3(0, 0, b[3] - b[2]));
     }
@@ -964,14 +964,14 @@ static void strips(void)
     int at;
     for (at = 0; (r = next_row("VF-STRIP", "F12", &at)) != NULL;) {
         const double h = parameter(r, "h"), length = 1e8;
-        near_relative(label(r->id, "closed"), pt_form_factor_parallel(1, length, h), r->value,
+        near_relative(row_label(r->id, "closed"), pt_form_factor_parallel(1, length, h), r->value,
                       10 * h / length);
         check_form_factor(r, on_floor(0, 1, 0, 0), v3(0, h, -FAR), v3(1, 0, 0), v3(0, 0, 2 * FAR));
     }
     for (at = 0; (r = next_row("VF-WEDGE", "F12", &at)) != NULL;) {
         const double a = parameter(r, "a_deg"), length = 1e6;
         if (fabs(a - 90) < 1) /* a long corner lacks about w / (4 l) of its value at the ends */
-            near_relative(label(r->id, "closed"), pt_form_factor_perpendicular(1, 1, length), r->value,
+            near_relative(row_label(r->id, "closed"), pt_form_factor_perpendicular(1, 1, length), r->value,
                           2 / length);
         check_form_factor(r, on_floor(0, 1, 0, 0), v3(0, 0, -FAR), v3(cos(degrees(a)), sin(degrees(a)), 0),
                           v3(0, 0, 2 * FAR));
@@ -1019,12 +1019,12 @@ static void coaxial_disks(void)
         from.r = parameter(r, "r1");
         from.r2 = parameter(r, "r2");
         from.h = parameter(r, "h");
-        near_relative(label(r->id, "closed"), pt_form_factor_disks(from.r, from.r2, from.h), r->value, 2e-15);
-        check(label(r->id, "irradiance"), mean_irradiance, &from, r->value, 0,
+        near_relative(row_label(r->id, "closed"), pt_form_factor_disks(from.r, from.r2, from.h), r->value, 2e-15);
+        check(row_label(r->id, "irradiance"), mean_irradiance, &from, r->value, 0,
               "the mean of pt_irradiance_disk");
         add_disk(&scene, from.r2, from.h, 0, lamp(&scene, 1));
         commit(&scene);
-        check_hits(label(r->id, "rays"), arrive_from_disk, &from, r->value, r->value, 1e-4,
+        check_hits(row_label(r->id, "rays"), arrive_from_disk, &from, r->value, r->value, 1e-4,
                    "cosine-weighted rays that arrive");
         pt_scene_free(&scene);
     }
@@ -1054,13 +1054,13 @@ static void sphere_and_disk(void)
     while ((r = next_row("VF-SPHDISK", "F_sd", &at)) != NULL) {
         const double radius = parameter(r, "r"), h = parameter(r, "h");
         pt_scene scene = PT_SCENE_INIT;
-        near_relative(label(r->id, "closed"), pt_form_factor_sphere_disk(radius, h), r->value, 1e-15);
-        near_relative(label(r->id, "solid angle"), pt_solid_angle_disk(radius, h, 0) / (4 * PT_PI), r->value,
+        near_relative(row_label(r->id, "closed"), pt_form_factor_sphere_disk(radius, h), r->value, 1e-15);
+        near_relative(row_label(r->id, "solid angle"), pt_solid_angle_disk(radius, h, 0) / (4 * PT_PI), r->value,
                       1e-15);
         pt_add_sphere(&scene, v3(0, 0, 0), real(0.5 * h), lamp(&scene, 2));
         add_disk(&scene, radius, h, 0, wall(&scene, 0));
         commit(&scene);
-        check_bound(label(r->id, "emitted rays"), flux_onto_disk, &scene, 2 * MANY, r->value, 1e-4,
+        check_bound(row_label(r->id, "emitted rays"), flux_onto_disk, &scene, 2 * MANY, r->value, 1e-4,
                     14 * BOUND, "rays of pt_light_sample_le");
         pt_scene_free(&scene);
     }
@@ -1112,10 +1112,10 @@ static void concentric(void)
         pt_add_sphere(&scene, v3(0, 0, 0), real(radii[1]), wall(&scene, 0));
         commit(&scene);
         if (strcmp(r->quantity, "sphere_F21") == 0)
-            check_hits(label(r->id, "rays"), onto_inner_sphere, &scene, r->value, r->value, 0,
+            check_hits(row_label(r->id, "rays"), onto_inner_sphere, &scene, r->value, r->value, 0,
                        "rays from the outer sphere");
         else
-            check_hits(label(r->id, "rays"), onto_inner_cylinder, radii, r->value, r->value, 0,
+            check_hits(row_label(r->id, "rays"), onto_inner_cylinder, radii, r->value, r->value, 0,
                        "rays from the outer cylinder");
         pt_scene_free(&scene);
     }
@@ -1177,10 +1177,10 @@ static void closed_cylinders(void)
         c.r = parameter(r, "r");
         c.h = parameter(r, "h");
         across = pt_form_factor_disks(c.r, c.r, c.h);
-        near_relative(label(r->id, "closed"), sideways ? 1 - c.r / c.h * (1 - across) : across, r->value,
+        near_relative(row_label(r->id, "closed"), sideways ? 1 - c.r / c.h * (1 - across) : across, r->value,
                       1e-14);
         make_cylinder(&c);
-        check_hits(label(r->id, "rays"), sideways ? side_to_side : base_to_top, &c, r->value, r->value, 1e-4,
+        check_hits(row_label(r->id, "rays"), sideways ? side_to_side : base_to_top, &c, r->value, r->value, 1e-4,
                    "rays within a closed cylinder");
         pt_scene_free(&c.scene);
     }
@@ -1227,12 +1227,12 @@ static void bowls(void)
         bowl b = {NULL, 0};
         b.scene = &scene;
         b.omc = 2 * sin(a / 2) * sin(a / 2);
-        near_relative(label(r->id, "share of the sphere"), pt_solid_angle_cap(a) / (4 * PT_PI), r->value,
+        near_relative(row_label(r->id, "share of the sphere"), pt_solid_angle_cap(a) / (4 * PT_PI), r->value,
                       1e-15);
         pt_add_sphere(&scene, v3(0, 0, 0), 1, lamp(&scene, 1));
         pt_add_parallelogram(&scene, v3(-2, -2, cos(a)), v3(4, 0, 0), v3(0, 4, 0), wall(&scene, 0));
         commit(&scene);
-        check_hits(label(r->id, "paths"), bowl_to_itself, &b, r->value, r->value, is_float() ? 1e-5 : 0,
+        check_hits(row_label(r->id, "paths"), bowl_to_itself, &b, r->value, r->value, is_float() ? 1e-5 : 0,
                    "the share of its own light that a bowl sees");
         pt_scene_free(&scene);
     }
@@ -1305,16 +1305,16 @@ static void cube_by_reflections(void)
             continue;
         }
         if (r->quantity[0] == 'F')
-            near_relative(label(r->id, "closed"), r->quantity[1] == 'o' ? fo : fa, r->value, 1e-14);
+            near_relative(row_label(r->id, "closed"), r->quantity[1] == 'o' ? fo : fa, r->value, 1e-14);
         make_cube(&c, albedo);
         c.face = face_of(r->quantity);
         c.from_edges = albedo > 0 && !all ? 2 : 1;
         c.to_edges = all ? 0 : c.from_edges;
         if (c.to_edges == 1)
-            check_hits(label(r->id, r->quantity), cube_irradiance, &c, r->value, r->value, 0,
+            check_hits(row_label(r->id, r->quantity), cube_irradiance, &c, r->value, r->value, 0,
                        "edges of length 1");
         else
-            check_bound(label(r->id, r->quantity), cube_irradiance, &c, POINTS,
+            check_bound(row_label(r->id, r->quantity), cube_irradiance, &c, POINTS,
                         c.face < 0 ? r->value / 6 : r->value, 0, 12 * BOUND, "paths of two edges, or of all");
         pt_scene_free(&c.scene);
     }
@@ -1388,7 +1388,7 @@ static void integrating_spheres(void)
         make_grid(&sphere.scene, 1 - 2 * f, rho, le * f * 4 * PT_PI / area);
         commit(&sphere.scene);
         sphere.edges = k > 0 ? k + 1 : edges_for(rho);
-        check_bound(label(r->id, r->quantity), wall_radiance, &sphere,
+        check_bound(row_label(r->id, r->quantity), wall_radiance, &sphere,
                     k == 0    ? 16
                     : f < 0.2 ? 48
                               : 128,
@@ -1425,7 +1425,7 @@ static void spheres_around_point_lights(void)
         commit(&sphere.scene);
         sphere.direction = v3(sin(gamma), 0, cos(gamma));
         sphere.edges = edges_for(rho);
-        check_bound(label(r->id, "paths"), lit_wall, &sphere, 96, r->value, 1e-5,
+        check_bound(row_label(r->id, "paths"), lit_wall, &sphere, 96, r->value, 1e-5,
                     a < 0.7 ? 6 * BOUND : 16 * BOUND, "indirect radiance is rho / (1 - rho) / pi");
         pt_scene_free(&sphere.scene);
     }
@@ -1464,10 +1464,10 @@ static void concentric_spheres_that_shine(void)
         pair.middle = 0.5 * (parameter(r, "r1") + parameter(r, "r2"));
         pair.outwards = strcmp(r->quantity, "L_outer") == 0;
         pair.edges = edges_for(parameter(r, "rho2"));
-        check_bound(label(r->id, "paths"), between_spheres, &pair, 128, r->value, 1e-5, 9 * BOUND,
+        check_bound(row_label(r->id, "paths"), between_spheres, &pair, 128, r->value, 1e-5, 9 * BOUND,
                     "long paths");
         pair.edges = 0;
-        check_bound(label(r->id, "roulette"), between_spheres, &pair, POINTS / 2, r->value, 0, 8 * BOUND,
+        check_bound(row_label(r->id, "roulette"), between_spheres, &pair, POINTS / 2, r->value, 0, 8 * BOUND,
                     "roulette");
         pt_scene_free(&pair.scene);
     }

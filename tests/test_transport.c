@@ -29,26 +29,7 @@ typedef struct experiment {
     pt_li_options options;
 } experiment;
 
-#if defined(__GNUC__)
-#define LABEL_FORMAT __attribute__((format(printf, 1, 2)))
-#else
-#define LABEL_FORMAT
-#endif
-
 static uint64_t nonfinite; /* paths whose radiance was NaN or infinite */
-
-/* A name put together; holds for the next three calls. */
-LABEL_FORMAT static const char *label(const char *format, ...)
-{
-    static char ring[4][128];
-    static int next;
-    char *const text = ring[next++ % 4];
-    va_list arguments;
-    va_start(arguments, format);
-    vsnprintf(text, sizeof ring[0], format, arguments);
-    va_end(arguments);
-    return text;
-}
 
 static pt_rgb grey(double v) { return pt_rgb_grey((pt_real)v); }
 static pt_vec3 v3(double x, double y, double z) { return pt_v3((pt_real)x, (pt_real)y, (pt_real)z); }
