@@ -58,7 +58,7 @@
        [PT-08] materials (BSDFs)
        [PT-09] lights
        [PT-10] scene, camera, film
-       [PT-11] integrators: path tracing
+       [PT-11] integrators: path tracing, Whitted, distribution, branching; light-path expressions
        [PT-17] image files: PPM, PFM, PNG
        [PT-18] render driver: passes, threads, budgets, error against run time
        [PT-19] canonical scenes
@@ -76,10 +76,17 @@
        PT_NO_FILES         no image writers
        PT_NO_BVH           linear search instead of the tree
        PT_NO_ENVIRONMENT   no light from the background
+       PT_NO_MICROFACET    no rough metal and glass, no smooth metal, no Oren-Nayar
+       PT_NO_PHONG         no Phong and Blinn-Phong
+       PT_NO_COAT          no diffuse base under a smooth coat
+       PT_NO_MEASURED      no measured tables in the MERL layout
+       PT_NO_TEXTURES      no textures on albedo
+       PT_NO_WHITTED       only path tracing: no local, Whitted, distribution and branching method
+       PT_NO_LPE           no light-path expressions
        PT_NO_OBSERVER      no callback with the letters L D G S E of each path
        PT_NO_REPORT        no rows of error against run time, no CSV, no SVG (the error estimate stays)
        PT_NO_SCENES        no canonical scenes
-       PT_ONLY_PATH        only the method "path": implies PT_NO_OBSERVER and PT_NO_SCENES
+       PT_ONLY_PATH        only the method "path": implies PT_NO_WHITTED, _LPE, _OBSERVER and _SCENES
        PT_MALLOC(size,user) PT_REALLOC(pointer,size,user) PT_FREE(pointer,user)   all three or none
        PT_ASSERT(x)        default: nothing
        PT_ALLOW_FAST_MATH  lifts the refusal of -ffast-math; NaN checks and the watertight test then
@@ -108,8 +115,8 @@
 
    WHAT IT DOES NOT DO (today)
 
-       Glossy and measured materials, textures, participating media, motion, spectra other than for
-       making RGB values, and light paths traced from the light. A point light seen through glass or
+       Participating media, motion, spectra other than for making RGB values, light scattered more than
+       once within a rough surface, and light paths traced from the light. A point light seen through glass or
        in a mirror, and a caustic of a point light, have probability zero in path tracing from the
        eye: they are black, not noisy.
 
@@ -119,19 +126,28 @@
        [Arv95] Arvo: Stratified Sampling of Spherical Triangles, 1995
        [Bur20] Burley: Practical Hash-based Owen Scrambling, JCGT 9(4), 2020
        [Che83] Chan, Golub, LeVeque: Algorithms for Computing the Sample Variance, 1983
+       [Coo84] Cook, Porter, Carpenter: Distributed Ray Tracing, 1984
        [Duf17] Duff et al.: Building an Orthonormal Basis, Revisited, JCGT 6(1), 2017
+       [Dup23] Dupuy, Benyoub: Sampling Visible GGX Normals with Spherical Caps, 2023
        [Hai19] Haines, Guenther, Akenine-Moeller: Precision Improvements for Ray/Sphere Intersection,
                Ray Tracing Gems ch. 7, 2019
+       [Hei14] Heitz: Understanding the Masking-Shadowing Function, JCGT 3(2), 2014
+       [Hei18] Heitz: Sampling the GGX Distribution of Visible Normals, JCGT 7(4), 2018
        [How10] Howell: A Catalog of Radiation Heat Transfer Configuration Factors, 3rd edition, 2010
        [Ize13] Ize: Robust BVH Ray Traversal, JCGT 2(2), 2013
        [Joe08] Joe, Kuo: Constructing Sobol Sequences with Better Two-Dimensional Projections, 2008
        [Kaj86] Kajiya: The Rendering Equation, 1986
        [Ken13] Kensler: Correlated Multi-Jittered Sampling, Pixar memo 13-01, 2013
+       [Laf94] Lafortune, Willems: Using the Modified Phong Reflectance Model, 1994
        [Lam60] Lambert: Photometria, 1760 (polygon irradiance; see Arvo, Applications of Irradiance
                Tensors, 1995)
+       [Mat03] Matusik, Pfister, Brand, McMillan: A Data-Driven Reflectance Model, 2003
        [One14] O'Neill: PCG, a Family of Better Random Number Generators, 2014
        [Oos83] Van Oosterom, Strackee: The Solid Angle of a Plane Triangle, 1983
+       [Ore94] Oren, Nayar: Generalization of Lambert's Reflectance Model, 1994
        [PBR]   Pharr, Jakob, Humphreys: Physically Based Rendering, 4th edition, 2023
+       [Rus98] Rusinkiewicz: A New Change of Variables for Efficient BRDF Representation, 1998
+       [Sch94] Schlick: An Inexpensive BRDF Model for Physically-based Rendering, 1994
        [Shi97] Shirley, Chiu: A Low Distortion Map Between Disk and Square, 1997
        [Sny96] Snyder: Area Light Sources for Real-Time Graphics, 1996
        [Ste11] Stafford: Better Bit Mixing, 2011 (finaliser used by Java's SplittableRandom)
@@ -139,6 +155,9 @@
        [Vea97] Veach: Robust Monte Carlo Methods for Light Transport Simulation, 1997
        [Veg21] Vegdahl: Building a Better LK Hash, 2021
        [Vos91] Vose: A Linear Algorithm for Generating Random Numbers with a Given Distribution, 1991
+       [Wal07] Walter, Marschner, Li, Torrance: Microfacet Models for Refraction, 2007
+       [Wal26] Walsh: reflectance of diffuse light, 1926; see Duntley, J. Optical Society 32, 1942
+       [Whi80] Whitted: An Improved Illumination Model for Shaded Display, 1980
        [Woo13] Woop, Benthin, Wald: Watertight Ray/Triangle Intersection, JCGT 2(1), 2013
 */
 
@@ -162,6 +181,12 @@
 
 /* The switches, normalised once: below this table only PTI_HAS_X is asked. */
 #ifdef PT_ONLY_PATH
+#ifndef PT_NO_WHITTED
+#define PT_NO_WHITTED
+#endif
+#ifndef PT_NO_LPE
+#define PT_NO_LPE
+#endif
 #ifndef PT_NO_OBSERVER
 #define PT_NO_OBSERVER
 #endif
@@ -201,6 +226,41 @@
 #define PTI_HAS_ENVIRONMENT 0
 #else
 #define PTI_HAS_ENVIRONMENT 1
+#endif
+#ifdef PT_NO_MICROFACET
+#define PTI_HAS_MICROFACET 0
+#else
+#define PTI_HAS_MICROFACET 1
+#endif
+#ifdef PT_NO_PHONG
+#define PTI_HAS_PHONG 0
+#else
+#define PTI_HAS_PHONG 1
+#endif
+#ifdef PT_NO_COAT
+#define PTI_HAS_COAT 0
+#else
+#define PTI_HAS_COAT 1
+#endif
+#ifdef PT_NO_MEASURED
+#define PTI_HAS_MEASURED 0
+#else
+#define PTI_HAS_MEASURED 1
+#endif
+#ifdef PT_NO_TEXTURES
+#define PTI_HAS_TEXTURES 0
+#else
+#define PTI_HAS_TEXTURES 1
+#endif
+#ifdef PT_NO_WHITTED
+#define PTI_HAS_WHITTED 0
+#else
+#define PTI_HAS_WHITTED 1
+#endif
+#ifdef PT_NO_LPE
+#define PTI_HAS_LPE 0
+#else
+#define PTI_HAS_LPE 1
 #endif
 #ifdef PT_NO_OBSERVER
 #define PTI_HAS_OBSERVER 0
@@ -371,6 +431,8 @@ PTDEF double pt_luminance(double r, double g, double b);
 
 /* The sRGB transfer curve from linear light to the encoded value, both in [0,1] [IEC 61966-2-1]. */
 PTDEF double pt_srgb_encode(double linear);
+/* Its inverse. */
+PTDEF double pt_srgb_decode(double encoded);
 
 /* Linear light to an 8-bit sRGB code: clipped to [0,1], rounded to nearest; NaN and negative give 0,
    +infinity gives 255. */
@@ -645,6 +707,13 @@ PTDEF void pt_alias_free(pt_alias *table, void *alloc_user);
 PTDEF double pt_flux_point(double intensity);
 PTDEF double pt_exitance(double radiance);
 PTDEF double pt_flux_spot(double intensity, double cos_start, double cos_end);
+/* The inverses, for lamps that are sold by their flux: intensity of a point light of that flux, radiance of a
+   Lambertian surface of that area (one side). */
+PTDEF double pt_intensity_of_flux(double flux);
+PTDEF double pt_radiance_of_flux(double flux, double area);
+/* The flux per band in W of a lamp of that many lumens with the colour's ratios of bands: 683.002 lm/W times
+   its luminance is the luminous flux. Black for a black colour. */
+PTDEF pt_rgbd pt_watts_from_lumens(double lumens, pt_rgb colour);
 
 /* Solid angle in sr of a cap of half angle theta in [0, pi]; of a triangle seen from p [Oos83]; of a rectangle
    corner + s e1 + t e2 (e1, e2 perpendicular); of a simple flat polygon of count >= 3 corners; of a disk of
@@ -784,15 +853,89 @@ PTDEF void pt_bvh_free(pt_bvh *bvh, void *alloc_user);
 typedef enum pt_material_kind {
     PT_MATERIAL_DIFFUSE = 0, /* Lambert: f = albedo / pi, on both sides                                    */
     PT_MATERIAL_MIRROR,      /* perfect mirror on both sides, reflectance = albedo                         */
-    PT_MATERIAL_DIELECTRIC   /* smooth glass: exact Fresnel reflection and refraction                      */
+    PT_MATERIAL_DIELECTRIC,  /* glass: exact Fresnel reflection and refraction; rough: GGX [Wal07]         */
+    PT_MATERIAL_CONDUCTOR,   /* metal: exact Fresnel of eta and k, times albedo; rough: GGX, on both sides */
+    PT_MATERIAL_OREN_NAYAR,  /* rough diffuse [Ore94], qualitative model; roughness = sigma in radians     */
+    PT_MATERIAL_PHONG,       /* albedo / pi + specular (n+2)/(2 pi) cos^n of the angle to the mirror ray   */
+    PT_MATERIAL_BLINN,       /* albedo / pi + specular N(n) cos^n of the half vector, N: 1 at the normal   */
+    PT_MATERIAL_COAT,        /* diffuse base under a smooth dielectric coat, all inner reflections counted */
+    PT_MATERIAL_MEASURED     /* a table in the MERL layout, times albedo, on both sides                    */
 } pt_material_kind;
 
-/* What a surface is made of. Zero is a black diffuse surface. */
+#if PTI_HAS_TEXTURES
+typedef enum pt_texture_kind {
+    PT_TEXTURE_IMAGE = 0,    /* bilinear, repeated in both directions                                      */
+    PT_TEXTURE_CHECKER,      /* a and b in turns, one square per unit of uv times scale                    */
+    PT_TEXTURE_FUNCTION      /* whatever the function returns                                              */
+} pt_texture_kind;
+
+/* A colour that varies over a surface. It multiplies the albedo of the materials that point to it, and must
+   live as long as they do; every value must be in [0,1] (an image is checked, a function is trusted). */
+typedef struct pt_texture {
+    pt_texture_kind kind;
+    const float *rgb;        /* image: width * height * 3 linear values, rows from the top (v = 1)         */
+    int width, height;
+    pt_vec2 scale;           /* repeats per unit of uv; 0 = 1                                              */
+    pt_rgb a, b;             /* checker                                                                    */
+    pt_rgb (*function)(void *user, pt_vec2 uv, pt_vec3 p); /* uv (unscaled) and point                      */
+    void *user;
+} pt_texture;
+
+/* Its value. */
+PTDEF pt_rgb pt_texture_eval(const pt_texture *texture, pt_vec2 uv, pt_vec3 p);
+#endif
+
+#if PTI_HAS_MEASURED
+/* An isotropic BRDF as a table in the MERL layout [Mat03]: 90 x 90 x 180 cells of theta_h (by its square
+   root), theta_d, phi_d. (The slides' theta_i, theta_o, |phi_i - phi_o| is what was measured; the table is of
+   the half vector and the difference angles.) Start from PT_MEASURED_INIT. */
+#define PT_MEASURED_CELLS 1458000
+typedef struct pt_measured {
+    void *alloc_user;
+    double *value;           /* three planes of cells (R, G, B), each as in the file: f times 1500, 1500/1.15,
+                                1500/1.66; negative where nothing was measured (counts as 0)               */
+    double cdf[91];          /* of theta_h, for sampling                                                   */
+} pt_measured;
+#define PT_MEASURED_INIT PTI_ZERO_INIT
+
+/* A BRDF in 1/sr: wo and wi are unit, with z along the normal, both above the surface. */
+typedef pt_rgb (*pt_brdf_fn)(void *user, pt_vec3 wo, pt_vec3 wi);
+/* One scattering event: from wo to wi with its weight f cos / pdf; 0: absorbed, or left below. */
+typedef int (*pt_scatter_fn)(void *user, pt_vec3 wo, pt_pcg32 *random, pt_vec3 *wi, pt_rgb *weight);
+
+/* The cell of a pair of directions, 0..PT_MEASURED_CELLS - 1. */
+PTDEF int pt_measured_index(pt_vec3 wo, pt_vec3 wi);
+/* The directions at the centre of a cell; 0 if one of them is below the surface. */
+PTDEF int pt_measured_directions(int index, pt_vec3 *wo, pt_vec3 *wi);
+/* The value of the cell in 1/sr. */
+PTDEF pt_rgb pt_measured_eval(const pt_measured *m, pt_vec3 wo, pt_vec3 wi);
+/* A virtual gonioreflectometer that knows the BRDF: its value at the centre of each cell. Allocates 35 MB. */
+PTDEF pt_result pt_measured_fill(pt_measured *m, pt_brdf_fn f, void *user);
+/* One that does not, as a real one: it counts what `samples` rays that come in by the cosine scatter into
+   each cell, and divides by what a white diffuse standard scatters there. Cells are joined in blocks of
+   block^3 (a divisor of 90) so that each gets enough. This measures whatever scatter does: a BSDF, or paths
+   traced in a piece of micro-geometry. Cells beyond reach stay unmeasured. */
+PTDEF pt_result pt_measured_scatter(pt_measured *m, pt_scatter_fn scatter, void *user, uint64_t samples, int block,
+                                    uint64_t seed);
+PTDEF void pt_measured_free(pt_measured *m);
+#endif
+
+/* What a surface is made of. Zero is a black diffuse surface. Textures and tables stay the caller's. */
 typedef struct pt_material {
     pt_material_kind kind;
     pt_rgb albedo;           /* reflectance in [0,1]; 0 = black. Dielectric: not used                      */
     pt_rgb emission;         /* emitted radiance >= 0, W sr^-1 m^-2; 0 = does not emit                     */
-    pt_real ior;             /* index of refraction inside over outside, > 0; 0 = 1.5. Dielectric only     */
+    pt_real ior;             /* index of refraction inside over outside, > 0; 0 = 1.5. Dielectric; coat > 1 */
+    pt_real roughness;       /* in [0,1], 0 = smooth. GGX has alpha = roughness^2                          */
+    pt_rgb eta, k;           /* conductor: complex index over that of the outside; eta > 0, k >= 0         */
+    pt_rgb specular;         /* Phong, Blinn: reflectance of the glossy lobe; albedo + specular <= 1       */
+    pt_real exponent;        /* Phong, Blinn: n in [0, 1e6]                                                */
+#if PTI_HAS_TEXTURES
+    const pt_texture *texture; /* multiplies the albedo; NULL = none                                       */
+#endif
+#if PTI_HAS_MEASURED
+    const pt_measured *measured;
+#endif
     int medium_inside;       /* medium ids of the two sides of the surface; 0 = vacuum. Stored for the     */
     int medium_outside;      /*   volumetric methods; must be 0 as long as there are none                  */
 } pt_material;
@@ -802,6 +945,23 @@ PTDEF pt_material pt_material_diffuse(pt_rgb albedo);
 PTDEF pt_material pt_material_emitter(pt_rgb radiance);
 PTDEF pt_material pt_material_mirror(pt_rgb reflectance);
 PTDEF pt_material pt_material_dielectric(pt_real ior);
+#if PTI_HAS_MICROFACET
+PTDEF pt_material pt_material_rough_dielectric(pt_real ior, pt_real roughness);
+/* eta and k per band; gold is about (0.14, 0.37, 1.44) and (3.98, 2.38, 1.60). */
+PTDEF pt_material pt_material_conductor(pt_rgb eta, pt_rgb k, pt_real roughness);
+/* Standard deviation sigma of the facets' angle in radians, at most 1. */
+PTDEF pt_material pt_material_oren_nayar(pt_rgb albedo, pt_real sigma);
+#endif
+#if PTI_HAS_PHONG
+PTDEF pt_material pt_material_phong(pt_rgb albedo, pt_rgb specular, pt_real exponent);
+PTDEF pt_material pt_material_blinn(pt_rgb albedo, pt_rgb specular, pt_real exponent);
+#endif
+#if PTI_HAS_COAT
+PTDEF pt_material pt_material_coat(pt_rgb albedo, pt_real ior);
+#endif
+#if PTI_HAS_MEASURED
+PTDEF pt_material pt_material_measured(const pt_measured *table);
+#endif
 
 /* Kinds of scattering. Each lobe of a BSDF has one letter of the light-path alphabet. */
 enum {
@@ -820,6 +980,7 @@ typedef struct pt_bsdf {
     const pt_material *material;
     pt_frame frame;          /* around the shading normal                                                  */
     pt_vec3 ng;              /* decides which side a direction is on                                       */
+    pt_rgb albedo;           /* the material's, times its texture                                          */
     unsigned lobes;          /* which PT_LOBE_X it has                                                     */
 } pt_bsdf;
 
@@ -844,9 +1005,31 @@ PTDEF pt_real pt_bsdf_pdf_w(const pt_bsdf *b, pt_vec3 wo, pt_vec3 wi, pt_transpo
 PTDEF int pt_bsdf_sample(const pt_bsdf *b, pt_vec3 wo, double u_lobe, pt_vec2 u, pt_transport mode,
                          pt_bsdf_sample_result *out);
 
-/* Fresnel reflectance of unpolarised light at a smooth dielectric: cos_i in [0,1], eta = index on the far
-   side over that on the near side, > 0. *cos_t: cosine of refraction, 0 at total reflection (result 1). */
+/* Fresnel reflectance of a smooth dielectric for light polarised across (s) and in (p) the plane of incidence,
+   and their mean r, that of unpolarised light. cos_i in [0,1], eta = index on the far side over that on the
+   near side, > 0. cos_t: cosine of refraction, 0 at total reflection (then all are 1). */
+typedef struct pt_fresnel {
+    double rs, rp, r, cos_t;
+} pt_fresnel;
+PTDEF pt_fresnel pt_fresnel_make(double cos_i, double eta);
+/* The mean alone. */
 PTDEF double pt_fresnel_dielectric(double cos_i, double eta, double *cos_t);
+/* Schlick's approximation r0 + (1 - r0)(1 - cos)^5 [Sch94]: from the near side of the larger index the cosine
+   is that of refraction, and 1 at total reflection. For comparison: the materials use the exact formula. */
+PTDEF double pt_fresnel_schlick(double cos_i, double eta);
+/* Mean reflectance of diffuse (cosine-distributed) light at a smooth dielectric. */
+PTDEF double pt_fresnel_diffuse(double eta);
+#if PTI_HAS_MICROFACET
+/* Reflectance of unpolarised light at a metal of index eta - i k over that of the near side. */
+PTDEF double pt_fresnel_conductor(double cos_i, double eta, double k);
+/* The GGX microfacet distribution [Wal07] around z: density of normals per area and solid angle, Smith's masking
+   function G1, and the density of the normals that are visible from wo. alpha > 0. */
+PTDEF double pt_ggx_d(pt_vec3 h, double alpha);
+PTDEF double pt_ggx_g1(pt_vec3 w, double alpha);
+PTDEF double pt_ggx_visible_pdf_w(pt_vec3 wo, pt_vec3 h, double alpha);
+/* Draws a visible normal; wo above the surface. */
+PTDEF pt_vec3 pt_ggx_visible_sample(pt_vec3 wo, double alpha, pt_vec2 u);
+#endif
 
 /* =====================================================================================================
    [PT-09] LIGHTS: declarations
@@ -855,15 +1038,19 @@ PTDEF double pt_fresnel_dielectric(double cos_i, double eta, double *cos_t);
 typedef enum pt_light_kind {
     PT_LIGHT_AREA = 0,       /* an emissive primitive                                                      */
     PT_LIGHT_POINT,          /* intensity I W/sr in all directions                                         */
-    PT_LIGHT_ENVIRONMENT     /* constant radiance from infinity                                            */
+    PT_LIGHT_SPOT,           /* the same within a cone, with a smooth rim                                  */
+    PT_LIGHT_DIRECTIONAL,    /* parallel light of a given irradiance from infinity                         */
+    PT_LIGHT_ENVIRONMENT     /* radiance from infinity: constant or an image                               */
 } pt_light_kind;
 
 /* A light of the committed scene. */
 typedef struct pt_light {
     pt_light_kind kind;
     int primitive;           /* area: which one                                                            */
-    pt_vec3 position;        /* point                                                                      */
-    pt_rgb emission;         /* radiance, or intensity of a point light                                    */
+    pt_vec3 position;        /* point, spot                                                                */
+    pt_vec3 direction;       /* spot, directional: where the light goes (unit)                             */
+    double cos_start, cos_end; /* spot: full intensity within the first angle, none beyond the second      */
+    pt_rgb emission;         /* radiance (environment: its mean), intensity, or irradiance (directional)   */
     double area;             /* area: m^2                                                                  */
     double pmf;              /* probability to be chosen: its share of the power                           */
 } pt_light;
@@ -871,21 +1058,23 @@ typedef struct pt_light {
 /* Light that arrives at a point from one sampled direction. */
 typedef struct pt_light_sample_result {
     pt_vec3 wi;              /* unit direction from the point to the light                                 */
-    pt_vec3 p, p_error, n;   /* the point on the light and its normal; n = 0 for a point light             */
-    pt_real distance;        /* to p; larger than the scene for the environment                            */
-    pt_rgb radiance;         /* what arrives if nothing is in between; point: I / d^2                      */
-    double pdf_w;            /* density per solid angle given this light; 1 for a point light              */
-    int delta;               /* 1: no other technique can find this light                                  */
+    pt_vec3 p, p_error, n;   /* the point on the light and its normal; n = 0 for delta lights, environment */
+    pt_real distance;        /* to p; larger than the scene for lights at infinity                         */
+    pt_rgb radiance;         /* what arrives if nothing is in between; delta lights: irradiance across wi  */
+    double pdf_w;            /* density per solid angle given this light; 1 for delta lights               */
+    int delta;               /* 1: point, spot, directional: no other technique can find this light        */
+    int infinite;            /* 1: the light is at infinity                                                */
 } pt_light_sample_result;
 
 /* Light that leaves a light. */
 typedef struct pt_light_emission_result {
-    pt_vec3 p, p_error, n;   /* where (n = 0 for a point light)                                            */
+    pt_vec3 p, p_error, n;   /* where (n = 0 unless an area light)                                         */
     pt_vec3 w;               /* and into which direction                                                   */
-    pt_rgb radiance;         /* emitted radiance, or intensity of a point light                            */
-    double pdf_a;            /* density of p per area; 1 for a point light. Environment: on the disk       */
-    double pdf_w;            /* density of w per solid angle given p                                       */
-    double cos_n;            /* |w . n|; 1 for a point light and the environment                           */
+    pt_rgb radiance;         /* emitted radiance, intensity (point, spot) or irradiance (directional)      */
+    double pdf_a;            /* density of p per area; 1 for point and spot. At infinity: on a disk across
+                                w as wide as the scene                                                     */
+    double pdf_w;            /* density of w per solid angle given p; directional: 1                       */
+    double cos_n;            /* |w . n|; 1 unless an area light                                            */
 } pt_light_emission_result;
 
 /* =====================================================================================================
@@ -915,10 +1104,22 @@ typedef struct pt_parallelogram {
     int material;
 } pt_parallelogram;
 
-typedef struct pt_point_light {
-    pt_vec3 position;
-    pt_rgb intensity;
-} pt_point_light;
+/* A light that no ray can hit. */
+typedef struct pt_delta_light {
+    pt_light_kind kind;      /* point, spot or directional                                                 */
+    pt_vec3 position, direction;
+    pt_rgb intensity;        /* directional: irradiance across the direction                               */
+    double cos_start, cos_end;
+} pt_delta_light;
+
+/* An environment image with the distribution of its light over its pixels: rows by rows[], columns within row y
+   by columns[y (width + 1) ...]. */
+typedef struct pt_environment_map {
+    float *rgb;              /* width * height * 3, rows from the zenith (+y)                              */
+    double *rows, *columns;  /* cumulative                                                                 */
+    int width, height;
+    double scale;            /* of the values                                                              */
+} pt_environment_map;
 
 /* One entry of the committed scene's list of primitives: a kind and an index into the array of that kind. */
 typedef struct pt_primitive {
@@ -927,7 +1128,8 @@ typedef struct pt_primitive {
     int light;               /* -1 if it does not emit                                                     */
 } pt_primitive;
 
-/* What a scene uses; pt_scene_needs returns the union. */
+/* What a scene uses; pt_scene_needs returns the union. Materials stand in the order of their kinds, lights in
+   that of theirs. */
 enum {
     PT_NEEDS_TRIANGLES = 1 << 0,
     PT_NEEDS_PARALLELOGRAMS = 1 << 1,
@@ -937,10 +1139,22 @@ enum {
     PT_NEEDS_DIFFUSE = 1 << 5,
     PT_NEEDS_MIRROR = 1 << 6,
     PT_NEEDS_DIELECTRIC = 1 << 7,
-    PT_NEEDS_AREA_LIGHTS = 1 << 8,
-    PT_NEEDS_POINT_LIGHTS = 1 << 9,
-    PT_NEEDS_ENVIRONMENT = 1 << 10,
-    PT_NEEDS_BVH = 1 << 11
+    PT_NEEDS_CONDUCTOR = 1 << 8,
+    PT_NEEDS_OREN_NAYAR = 1 << 9,
+    PT_NEEDS_PHONG = 1 << 10,
+    PT_NEEDS_BLINN = 1 << 11,
+    PT_NEEDS_COAT = 1 << 12,
+    PT_NEEDS_MEASURED = 1 << 13,
+    PT_NEEDS_ROUGHNESS = 1 << 14, /* rough glass or metal                                                  */
+    PT_NEEDS_TEXTURES = 1 << 15,
+    PT_NEEDS_AREA_LIGHTS = 1 << 16,
+    PT_NEEDS_POINT_LIGHTS = 1 << 17,
+    PT_NEEDS_SPOT_LIGHTS = 1 << 18,
+    PT_NEEDS_DIRECTIONAL_LIGHTS = 1 << 19,
+    PT_NEEDS_ENVIRONMENT = 1 << 20,
+    PT_NEEDS_ENVIRONMENT_IMAGE = 1 << 21,
+    PT_NEEDS_BVH = 1 << 22,
+    PT_NEEDS_ALL = (1 << 23) - 1
 };
 
 /* A scene: add to it, pt_commit it, render it, free it. Start from PT_SCENE_INIT. The fields are for reading,
@@ -955,12 +1169,15 @@ typedef struct pt_scene {
     pt_mesh *meshes;
     pt_sphere *spheres;
     pt_parallelogram *parallelograms;
-    pt_point_light *point_lights;
+    pt_delta_light *delta_lights;
     uint32_t material_count, position_count, normal_count, uv_count, triangle_count, mesh_count, sphere_count,
-        parallelogram_count, point_light_count;
+        parallelogram_count, delta_light_count;
     uint32_t material_capacity, position_capacity, normal_capacity, uv_capacity, triangle_capacity,
-        mesh_capacity, sphere_capacity, parallelogram_capacity, point_light_capacity;
-    pt_rgb environment;
+        mesh_capacity, sphere_capacity, parallelogram_capacity, delta_light_capacity;
+    pt_rgb environment;      /* constant radiance, or the mean of the image                                */
+#if PTI_HAS_ENVIRONMENT
+    pt_environment_map map;  /* rgb = NULL: constant                                                       */
+#endif
     /* made by pt_commit */
     pt_primitive *primitives;
     pt_light *lights;
@@ -995,9 +1212,21 @@ PTDEF int pt_add_mesh(pt_scene *scene, const pt_vec3 *positions, const pt_vec3 *
                       uint32_t vertex_count, const uint32_t *indices, uint32_t triangle_count, int material);
 /* intensity >= 0 in W/sr */
 PTDEF int pt_add_point_light(pt_scene *scene, pt_vec3 position, pt_rgb intensity);
+/* A spot light: intensity >= 0 in W/sr along the axis `direction` and up to start_deg from it, falling smoothly
+   (pt_spot_falloff) to 0 at end_deg; 0 <= start_deg < end_deg <= 180. */
+PTDEF int pt_add_spot_light(pt_scene *scene, pt_vec3 position, pt_vec3 direction, pt_rgb intensity, double start_deg,
+                            double end_deg);
+/* Parallel light that goes along `direction`, irradiance >= 0 in W/m^2 across it. */
+PTDEF int pt_add_directional_light(pt_scene *scene, pt_vec3 direction, pt_rgb irradiance);
 #if PTI_HAS_ENVIRONMENT
 /* Constant radiance >= 0 from every direction that leaves the scene. Returns 0, or -1. */
 PTDEF int pt_set_environment(pt_scene *scene, pt_rgb radiance);
+/* Radiance from a latitude-longitude image times `scale`: rows from the zenith (+y), the middle column is -z, the
+   column right of it towards +x. rgb: width * height * 3 finite values >= 0, copied. Sampled in proportion to
+   luminance and solid angle of each pixel; constant over a pixel. Returns 0, or -1. */
+PTDEF int pt_set_environment_image(pt_scene *scene, const float *rgb, int width, int height, double scale);
+/* The radiance that arrives from direction w (unit). */
+PTDEF pt_rgb pt_environment_radiance(const pt_scene *scene, pt_vec3 w);
 #endif
 
 /* Coordinates, edges and radii beyond this are refused: squares of distances must stay in range, and a
@@ -1025,9 +1254,9 @@ PTDEF int pt_light_choose(const pt_scene *scene, double u, double *pmf);
 /* Samples the light as seen from p; 0 if it cannot light p (behind it, no extent). Area lights by solid
    angle. */
 PTDEF int pt_light_sample(const pt_scene *scene, int light, pt_vec3 p, pt_vec2 u, pt_light_sample_result *out);
-/* The density per solid angle at p with which pt_light_sample finds what a ray from p hit: `hit` on an area
-   light, or NULL for the environment. Without the probability of the choice. */
-PTDEF double pt_light_pdf_w(const pt_scene *scene, int light, pt_vec3 p, const pt_hit *hit);
+/* The density per solid angle at p with which pt_light_sample finds what a ray from p along w (unit) hit: `hit` on
+   an area light, or NULL for the environment. Without the probability of the choice. */
+PTDEF double pt_light_pdf_w(const pt_scene *scene, int light, pt_vec3 p, pt_vec3 w, const pt_hit *hit);
 /* Samples a ray that leaves the light: a point with u_p, a direction with u_w, u_side chooses the side of a
    sphere. */
 PTDEF int pt_light_sample_le(const pt_scene *scene, int light, pt_vec2 u_p, pt_vec2 u_w, pt_real u_side,
@@ -1050,6 +1279,8 @@ typedef struct pt_camera {
 /* From eye towards target, `up` upwards in the picture (not parallel to the view), vfov_deg in (0,180). A
    camera that cannot be made has tan_half 0, which pt_render refuses. */
 PTDEF pt_camera pt_camera_look_at(pt_vec3 eye, pt_vec3 target, pt_vec3 up, pt_real vfov_deg);
+/* Vertical field of view in degrees of a film of that height behind a lens of that focal length (the same unit). */
+PTDEF double pt_vfov_deg_of_film(double film_height, double focal_length);
 /* The ray through image point (x,y) of a picture with aspect = width / height; lens in [0,1)^2. */
 PTDEF pt_ray pt_camera_ray(const pt_camera *camera, pt_real aspect, pt_real x, pt_real y, pt_vec2 lens);
 
@@ -1074,6 +1305,18 @@ PTDEF int pt_camera_we(const pt_camera *camera, pt_real aspect, pt_vec3 p, pt_ve
 PTDEF void pt_camera_pdf(const pt_camera *camera, pt_real aspect, pt_vec3 direction, double *pdf_a,
                          double *pdf_w);
 
+/* How a pixel weighs the image around its centre. Filters are sampled, not weighted with: a sample belongs to one
+   pixel, which is then the plain mean of its samples. */
+typedef enum pt_filter {
+    PT_FILTER_BOX = 0,       /* the square of half width `radius`; default 0.5: the pixel itself           */
+    PT_FILTER_TENT,          /* a pyramid of half width `radius`; default 1                                */
+    PT_FILTER_GAUSSIAN       /* sigma = radius / 3, cut off at the circle of that radius; default 1.5      */
+} pt_filter;
+
+/* A point of the filter in pixels from the centre, each with density proportional to the filter; radius 0 = the
+   default. */
+PTDEF pt_vec2 pt_filter_sample(pt_filter filter, double radius, pt_vec2 u);
+
 /* A range of sample indices, the end excluded. */
 typedef struct pt_range {
     uint32_t begin, end;
@@ -1088,6 +1331,9 @@ typedef struct pt_film {
     double *splat[2];        /* contributions of light paths, NULL without; same scale                     */
     double *albedo, *normal; /* width * height * 3 sums over all samples, NULL unless asked for            */
     double *depth;           /* width * height: sums of distances from the ray's origin, misses add 0      */
+    double *classes;         /* class_count pictures of width * height * 3 sums, one for each class of light
+                                paths, NULL unless asked for; together they are the whole                  */
+    int class_count;
     int width, height;
     uint32_t samples[2];     /* per pixel, in each half                                                    */
     pt_range *ranges;        /* which samples are in: disjoint, rising                                     */
@@ -1118,6 +1364,11 @@ typedef struct pt_splat_list {
 /* An empty film of width x height pixels, each in [1, 65536]. aov != 0 adds albedo, normal and depth. Frees
    what the film held. */
 PTDEF pt_result pt_film_make(pt_film *film, int width, int height, int aov);
+/* Makes room for that many classes of light paths in an empty film. */
+PTDEF pt_result pt_film_make_classes(pt_film *film, int class_count);
+/* The picture of one class as a film of its own, for the writers: `out` is made anew; its halves are not told
+   apart, so it has no error estimate. */
+PTDEF pt_result pt_film_class(const pt_film *film, int index, pt_film *out);
 /* The value of a pixel: the mean over all samples, splats included. */
 PTDEF pt_rgbd pt_film_pixel(const pt_film *film, int x, int y);
 /* All samples per pixel. */
@@ -1160,9 +1411,36 @@ typedef enum pt_roulette {
 /* Told of each contribution to a path's radiance, for light-path expressions: `word` reads from the light to
    the eye over L D G S E ("LDDE"), `value` is already weighted. With more than PT_WORD_MAX letters between L
    and E the last ones before the eye are kept and '*' stands for L and the others. Values of one path sum to
-   its radiance up to rounding; observing changes no random number. */
+   its radiance up to rounding; observing changes no random number. Where a surface has lobes of two letters, light
+   that was sampled is told lobe by lobe, but a path goes on under the letter of the lobe that was drawn: exact
+   classes are what light-path expressions are for. */
 typedef void (*pt_observer)(void *user, const char *word, int edges, pt_rgbd value);
 #define PT_WORD_MAX 60
+#endif
+
+#if PTI_HAS_LPE
+/* Light-path expressions: regular expressions over words that read from the light to the eye, L first, E last,
+   between them one letter for each surface: D diffuse, G glossy (rough), S specular (mirror, glass), V volume.
+   '.' is any of DGSV, [DG] one of a set, ( ) group, | or, * any number, + one or more, ? one or none. A list of
+   expressions divides light into classes: a path belongs to the first that matches, what none matches to one
+   more class at the end, so that the classes add up to the whole. */
+#define PT_LPE_EXPRESSIONS 16 /* most expressions of a list */
+#define PT_LPE_STATES 64
+typedef struct pt_lpe {
+    int class_count;            /* expressions + 1                                                         */
+    int state_count;
+    unsigned char next[PT_LPE_STATES][5]; /* automaton from the eye (state 0: E was read) by D G S V       */
+    unsigned char class_of[PT_LPE_STATES]; /* the class of the path if the light comes now                 */
+} pt_lpe;
+/* The rows of the slides, G counted as D: emission, direct, specular, caustic, colour bleeding, reflected
+   caustic or bleeding, other, volume; and the words LE | L(D|S)E | L(S|D)S+E | LS+DE | L(S|D)*DDE | ... */
+#define PT_LPE_SLIDES_COUNT 8
+PTDEF const char *const *pt_lpe_slides(void);
+/* Compiles a list. *error (may be NULL): what is wrong with it. PT_ERROR_ARGUMENT: not an expression, more than
+   64 letters in one, or an automaton of more than PT_LPE_STATES states. */
+PTDEF pt_result pt_lpe_compile(pt_lpe *lpe, const char *const *expressions, int count, const char **error);
+/* The class of a word such as "LSDE", -1 if it is no word. */
+PTDEF int pt_lpe_class(const pt_lpe *lpe, const char *word);
 #endif
 
 /* How to follow a path; zero is the default. */
@@ -1172,6 +1450,13 @@ typedef struct pt_li_options {
     pt_real roulette_survival;  /* PT_ROULETTE_CONSTANT: in (0, 1); 0 = 0.8                                */
     int roulette_start;         /* edges before the first roulette, >= 1; 0 = 1 if constant, else 3        */
     pt_heuristic heuristic;     /* of multiple importance sampling                                         */
+#if PTI_HAS_WHITTED
+    int branching;              /* method "branching": directions per hit; 0 = 4                           */
+    pt_rgb ambient;             /* method "local": the slides' ambient light, times albedo                 */
+#endif
+#if PTI_HAS_LPE
+    const pt_lpe *lpe;          /* path methods and "distribution": classes to tell apart, NULL = none     */
+#endif
     int (*poll)(void *user);    /* asked every 2^16 edges of a path, from the thread that renders it;
                                    non-zero ends it (NULL = never)                                         */
     void *poll_user;
@@ -1190,6 +1475,9 @@ typedef struct pt_li_info {
     pt_rgb albedo;
     pt_vec3 normal;
     pt_real depth;
+#if PTI_HAS_LPE
+    pt_rgbd *classes;           /* with options->lpe: class_count sums, added to; not NULL then            */
+#endif
 } pt_li_info;
 
 /* Estimates the radiance that arrives along a ray, from however far (tmax and the length of d do not matter).
@@ -1209,6 +1497,26 @@ PTDEF pt_rgbd pt_li_path_plain(const pt_scene *scene, const pt_ray *ray, pt_samp
 PTDEF pt_rgbd pt_li_path_light(const pt_scene *scene, const pt_ray *ray, pt_sampler *sampler,
                                const pt_li_options *options, pt_li_info *info);
 #endif
+#if PTI_HAS_WHITTED
+/* Methods of the time before path tracing; what each leaves out is the point of having it. max_edges 0 means 12
+   edges for "whitted" and "distribution", 4 for "branching".
+   local: the slides' L = ka Ia + sum of (I/r^2) (kd max(0, n.l) + ks max(0, n.h)^p), no shadows, no reflections; kd,
+   ks, p are albedo, specular, exponent; every light as if all of it came from its middle. */
+PTDEF pt_rgbd pt_li_local(const pt_scene *scene, const pt_ray *ray, pt_sampler *sampler, const pt_li_options *options,
+                          pt_li_info *info);
+/* Whitted's tree [Whi80]: shadow rays to the middle of every light, mirror and refracted rays followed both; paths
+   L(D|G)?S*E. Deterministic but for the pixel: hard shadows. */
+PTDEF pt_rgbd pt_li_whitted(const pt_scene *scene, const pt_ray *ray, pt_sampler *sampler, const pt_li_options *options,
+                            pt_li_info *info);
+/* Distribution ray tracing [Coo84]: pixel, lens, lights and gloss are sampled, light between diffuse surfaces is
+   not: paths L(D|G|S)?(G|S)*E. */
+PTDEF pt_rgbd pt_li_distribution(const pt_scene *scene, const pt_ray *ray, pt_sampler *sampler,
+                                 const pt_li_options *options, pt_li_info *info);
+/* The slides' first solver of the rendering equation: options->branching directions at every hit, light found by
+   hitting it; rays grow as branching^edges. */
+PTDEF pt_rgbd pt_li_branching(const pt_scene *scene, const pt_ray *ray, pt_sampler *sampler,
+                              const pt_li_options *options, pt_li_info *info);
+#endif
 
 /* =====================================================================================================
    [PT-17] IMAGE FILES: declarations
@@ -1227,6 +1535,25 @@ PTDEF pt_result pt_write_png(const char *path, const pt_film *film, double expos
 PTDEF pt_result pt_write_ppm_bytes(const char *path, const unsigned char *rgb, int width, int height);
 PTDEF pt_result pt_write_png_bytes(const char *path, const unsigned char *rgb, int width, int height);
 PTDEF pt_result pt_write_pfm_floats(const char *path, const float *rgb, int width, int height);
+
+/* A picture in memory: width * height * 3 linear values, rows from the top. Start from PT_IMAGE_INIT. */
+typedef struct pt_image {
+    void *alloc_user;
+    float *rgb;
+    int width, height;
+} pt_image;
+#define PT_IMAGE_INIT PTI_ZERO_INIT
+/* Reads a PFM (PF, either byte order) or a binary PPM (P6, 8 bits; its sRGB transfer is undone). A file that is
+   truncated, larger than 65536 pixels a side or anything else is PT_ERROR_FILE, and the image stays empty. */
+PTDEF pt_result pt_read_image(const char *path, pt_image *image);
+PTDEF void pt_image_free(pt_image *image);
+
+#if PTI_HAS_MEASURED
+/* A table as a file in the MERL format: three 32-bit integers 90 90 180, then the three planes as 64-bit floats, all
+   little-endian. Other sizes and truncated files are PT_ERROR_FILE. */
+PTDEF pt_result pt_measured_write(const char *path, const pt_measured *m);
+PTDEF pt_result pt_measured_read(const char *path, pt_measured *m);
+#endif
 #endif
 
 /* =====================================================================================================
@@ -1239,6 +1566,9 @@ typedef struct pt_method {
     const char *summary;
     pt_li_fn li;                /* camera-path methods: the general body                                   */
     unsigned handles;           /* PT_NEEDS_X of scenes it can render; the rest is black or missing        */
+    int follows;                /* 1: it follows paths to their end: the mean is the whole radiance but for what
+                                   `handles` leaves out; 0: it leaves out classes of paths by design       */
+    int classes;                /* 1: it can tell classes of light paths apart                             */
 } pt_method;
 
 /* All methods of this build; pt_method_count of them. The first is the default. */
@@ -1278,6 +1608,8 @@ typedef struct pt_render_desc {
     pt_sampler_kind sampler;    /* 0 = Sobol                                                               */
     uint64_t seed;              /* every value, 0 too, is a seed                                           */
     pt_li_options li;
+    pt_filter filter;           /* 0 = box                                                                 */
+    double filter_radius;       /* pixels; 0 = the filter's default                                        */
     int threads;                /* 0 = as many as the machine has                                          */
     int tile;                   /* edge of a tile in pixels; 0 = 16. No influence on the picture           */
     int aov;                    /* 1: also albedo, normal and depth                                        */
@@ -1377,6 +1709,20 @@ PTDEF pt_result pt_scene_diffuse_sphere(pt_scene *scene, pt_camera *camera);
 PTDEF pt_result pt_scene_glass_ball(pt_scene *scene, pt_camera *camera);
 /* K. Beason's smallpt box: walls are spheres of radius 1e5. */
 PTDEF pt_result pt_scene_smallpt(pt_scene *scene, pt_camera *camera);
+/* Veach's plates: four lamps of equal power and rising size, seen in four metal plates of rising roughness. */
+PTDEF pt_result pt_scene_veach_plates(pt_scene *scene, pt_camera *camera);
+/* SmallVCM's room with a glossy floor, a mirror and a glass sphere. */
+PTDEF pt_result pt_scene_glossy_box(pt_scene *scene, pt_camera *camera);
+/* The nephroid of a mirroring ring. */
+PTDEF pt_result pt_scene_caustic_ring(pt_scene *scene, pt_camera *camera);
+#if PTI_HAS_ENVIRONMENT
+/* Endless water over a diffuse floor under a uniform sky: a closed form for every direction. */
+PTDEF pt_result pt_scene_pool(pt_scene *scene, pt_camera *camera);
+#if PTI_HAS_TEXTURES
+/* A sphere of each material; textured floor, image environment. */
+PTDEF pt_result pt_scene_materials(pt_scene *scene, pt_camera *camera);
+#endif
+#endif
 
 /* Measured reflectance of the Cornell box walls and emission of its lamp, as tables; and the linear RGB that
    pt_scene_cornell makes of them. name: "white", "red", "green" or "lamp"; any other gives an empty table and
@@ -1781,6 +2127,11 @@ PTDEF double pt_srgb_encode(double linear)
     return linear <= 0.0031308 ? 12.92 * linear : 1.055 * pow(linear, 1 / 2.4) - 0.055;
 }
 
+PTDEF double pt_srgb_decode(double encoded)
+{
+    return encoded <= 0.040449936 ? encoded / 12.92 : pow((encoded + 0.055) / 1.055, 2.4);
+}
+
 PTDEF unsigned char pt_srgb_byte(double linear)
 {
     /* Written so that NaN takes the first way: a cast of NaN to an integer is undefined. */
@@ -1853,6 +2204,14 @@ PTDEF double pt_pcg32_double(pt_pcg32 *rng)
 {
     uint64_t high = pt_pcg32_next(rng) >> 5, low = pt_pcg32_next(rng) >> 6; /* 27 and 26 bits */
     return (double)((high << 26) | low) * PTI_2_M53;
+}
+
+static pt_vec2 pti_pcg32_pair(pt_pcg32 *rng)
+{
+    pt_vec2 u;
+    u.x = pt_real_from_u32(pt_pcg32_next(rng));
+    u.y = pt_real_from_u32(pt_pcg32_next(rng));
+    return u;
 }
 
 PTDEF uint64_t pt_hash64(uint64_t x)
@@ -2864,6 +3223,23 @@ PTDEF double pt_flux_point(double intensity)
 PTDEF double pt_exitance(double radiance)
 {
     return PT_PI * radiance; /* int L cos over the hemisphere */
+}
+
+PTDEF double pt_intensity_of_flux(double flux)
+{
+    return flux / (4 * PT_PI);
+}
+
+PTDEF double pt_radiance_of_flux(double flux, double area)
+{
+    return flux / (PT_PI * area);
+}
+
+PTDEF pt_rgbd pt_watts_from_lumens(double lumens, pt_rgb colour)
+{
+    double r = (double)colour.r, g = (double)colour.g, b = (double)colour.b, y = pt_luminance(r, g, b);
+    double k = y > 0 ? lumens / (683.002 * y) : 0;
+    return pt_rgbd3(k * r, k * g, k * b);
 }
 
 PTDEF double pt_flux_spot(double intensity, double cos_start, double cos_end)
@@ -3922,12 +4298,18 @@ static int pti_search(const pt_scene *scene, const pti_ray *r, double tmax, pti_
    direction on the right side of one and the wrong side of the other scatters nothing, in eval and sample
    alike. */
 
-PTDEF pt_material pt_material_diffuse(pt_rgb albedo)
+static pt_material pti_material_of_kind(pt_material_kind kind, pt_rgb albedo)
 {
     pt_material m;
     memset(&m, 0, sizeof m);
+    m.kind = kind;
     m.albedo = albedo;
     return m;
+}
+
+PTDEF pt_material pt_material_diffuse(pt_rgb albedo)
+{
+    return pti_material_of_kind(PT_MATERIAL_DIFFUSE, albedo);
 }
 
 PTDEF pt_material pt_material_emitter(pt_rgb radiance)
@@ -3939,20 +4321,79 @@ PTDEF pt_material pt_material_emitter(pt_rgb radiance)
 
 PTDEF pt_material pt_material_mirror(pt_rgb reflectance)
 {
-    pt_material m = pt_material_diffuse(reflectance);
-    m.kind = PT_MATERIAL_MIRROR;
-    return m;
+    return pti_material_of_kind(PT_MATERIAL_MIRROR, reflectance);
 }
 
 PTDEF pt_material pt_material_dielectric(pt_real ior)
 {
-    pt_material m = pt_material_diffuse(pt_rgb_grey(0));
-    m.kind = PT_MATERIAL_DIELECTRIC;
+    pt_material m = pti_material_of_kind(PT_MATERIAL_DIELECTRIC, pt_rgb_grey(0));
     m.ior = ior;
     return m;
 }
 
-PTDEF double pt_fresnel_dielectric(double cos_i, double eta, double *cos_t)
+#if PTI_HAS_MICROFACET
+PTDEF pt_material pt_material_rough_dielectric(pt_real ior, pt_real roughness)
+{
+    pt_material m = pt_material_dielectric(ior);
+    m.roughness = roughness;
+    return m;
+}
+
+PTDEF pt_material pt_material_conductor(pt_rgb eta, pt_rgb k, pt_real roughness)
+{
+    pt_material m = pti_material_of_kind(PT_MATERIAL_CONDUCTOR, pt_rgb_grey(1));
+    m.eta = eta;
+    m.k = k;
+    m.roughness = roughness;
+    return m;
+}
+
+PTDEF pt_material pt_material_oren_nayar(pt_rgb albedo, pt_real sigma)
+{
+    pt_material m = pti_material_of_kind(PT_MATERIAL_OREN_NAYAR, albedo);
+    m.roughness = sigma;
+    return m;
+}
+#endif
+
+#if PTI_HAS_PHONG
+PTDEF pt_material pt_material_phong(pt_rgb albedo, pt_rgb specular, pt_real exponent)
+{
+    pt_material m = pti_material_of_kind(PT_MATERIAL_PHONG, albedo);
+    m.specular = specular;
+    m.exponent = exponent;
+    return m;
+}
+
+PTDEF pt_material pt_material_blinn(pt_rgb albedo, pt_rgb specular, pt_real exponent)
+{
+    pt_material m = pt_material_phong(albedo, specular, exponent);
+    m.kind = PT_MATERIAL_BLINN;
+    return m;
+}
+#endif
+
+#if PTI_HAS_COAT
+PTDEF pt_material pt_material_coat(pt_rgb albedo, pt_real ior)
+{
+    pt_material m = pti_material_of_kind(PT_MATERIAL_COAT, albedo);
+    m.ior = ior;
+    return m;
+}
+#endif
+
+#if PTI_HAS_MEASURED
+PTDEF pt_material pt_material_measured(const pt_measured *table)
+{
+    pt_material m = pti_material_of_kind(PT_MATERIAL_MEASURED, pt_rgb_grey(1));
+    m.measured = table;
+    return m;
+}
+#endif
+
+/* --- Fresnel --- */
+
+PTDEF pt_fresnel pt_fresnel_make(double cos_i, double eta)
 {
     /* Fresnel's r_s = (c - eta t)/(c + eta t) and r_p = (eta c - t)/(eta c + t) with the numerators multiplied
        out by Snell's law eta^2 (1 - t^2) = 1 - c^2, so that nothing cancels for eta near 1:
@@ -3960,21 +4401,365 @@ PTDEF double pt_fresnel_dielectric(double cos_i, double eta, double *cos_t)
            r_p =  (eta-1)(eta+1) ((c eta)^2 - (1-c)(1+c)) / (eta (eta c + t))^2
        t^2 = 1 - (1 - c^2)/eta^2, in the form that keeps digits near c = 0 and near c = 1. */
     double e = eta, c = fmin(1, fabs(cos_i)), d = (e - 1) * (e + 1), t2, t, rs, rp;
+    pt_fresnel f = {1, 1, 1, 0};
     t2 = c * c < 0.5 ? (d + c * c) / (e * e) : 1 - (1 - c) * (1 + c) / (e * e);
-    *cos_t = 0;
-    if (!(t2 > 0)) return 1;
+    if (!(t2 > 0)) return f;
     t = sqrt(t2);
-    *cos_t = t;
-    if (d == 0) return 0;
+    f.cos_t = t;
+    f.rs = f.rp = f.r = 0;
+    if (d == 0) return f;
     rs = -d / ((c + e * t) * (c + e * t));
     rp = d * ((c * e) * (c * e) - (1 - c) * (1 + c)) / (e * e * (e * c + t) * (e * c + t));
-    return fmin(1, 0.5 * (rs * rs + rp * rp));
+    f.rs = fmin(1, rs * rs);
+    f.rp = fmin(1, rp * rp);
+    f.r = 0.5 * (f.rs + f.rp);
+    return f;
 }
 
-static unsigned pti_material_lobes(const pt_material *m)
+PTDEF double pt_fresnel_dielectric(double cos_i, double eta, double *cos_t)
 {
-    if (m->kind == PT_MATERIAL_DIFFUSE) return pti_rgb_black(m->albedo) ? 0u : (unsigned)PT_LOBE_DIFFUSE;
-    return PT_LOBE_SPECULAR;
+    pt_fresnel f = pt_fresnel_make(cos_i, eta);
+    *cos_t = f.cos_t;
+    return f.r;
+}
+
+PTDEF double pt_fresnel_schlick(double cos_i, double eta)
+{
+    double r0 = (eta - 1) / (eta + 1), c = fmin(1, fabs(cos_i)), x;
+    r0 *= r0;
+    if (eta < 1) {
+        c = 1 - (1 - c) * (1 + c) / (eta * eta);
+        if (!(c > 0)) return 1;
+        c = sqrt(c);
+    }
+    x = (1 - c) * (1 - c);
+    return r0 + (1 - r0) * x * x * (1 - c);
+}
+
+PTDEF double pt_fresnel_diffuse(double eta)
+{
+    /* 2 int R(c) c dc in closed form [Wal26]; from the dense side by 1 - R = (1 - R')/eta^2, the reciprocity of
+       diffuse transmission. The terms cancel to the order of (eta-1)^2 near 1: below 1.0001 the first order
+       (eta-1)/3 is nearer, off by less than 4e-8. */
+    double n = eta, n2 = n * n, n4 = n2 * n2, a = n2 + 1, b = n4 - 1;
+    if (eta < 1) return 1 - (1 - pt_fresnel_diffuse(1 / eta)) * eta * eta;
+    if (eta < 1.0001) return (eta - 1) / 3;
+    return 0.5 + (n - 1) * (3 * n + 1) / (6 * (n + 1) * (n + 1)) +
+           n2 * (n2 - 1) * (n2 - 1) / (a * a * a) * log((n - 1) / (n + 1)) - 2 * n * n2 * (n2 + 2 * n - 1) / (a * b) +
+           8 * n4 * (n4 + 1) / (a * b * b) * log(n);
+}
+
+#if PTI_HAS_MICROFACET
+PTDEF double pt_fresnel_conductor(double cos_i, double eta, double k)
+{
+    /* With a^2 + b^2 and a of the refracted wave, [PBR] 9.3.6 in real numbers. a^2 = (ab + t)/2 is written as
+       (eta k)^2 * 2 / (ab - t) where t < 0, so that it does not cancel. */
+    double c = fmin(1, fabs(cos_i)), c2 = c * c, s2 = (1 - c) * (1 + c), t = eta * eta - k * k - s2, m = 2 * eta * k, ab, a, rs, rp;
+    ab = sqrt(t * t + m * m);
+    if (ab == 0) return 1; /* at the critical angle of a k of 0 */
+    a = sqrt(t >= 0 ? 0.5 * (ab + t) : 0.5 * m * m / (ab - t));
+    rs = (ab + c2 - 2 * a * c) / (ab + c2 + 2 * a * c);
+    rp = rs * (ab * c2 + s2 * s2 - 2 * a * c * s2) / (ab * c2 + s2 * s2 + 2 * a * c * s2);
+    return fmin(1, fmax(0, 0.5 * (rs + rp)));
+}
+
+/* --- GGX [Wal07]: D = alpha^2 / (pi (alpha^2 cos^2 + sin^2)^2), with sin^2 from x and y, which keeps its digits
+   at the peak. Lambda = (sqrt(1 + alpha^2 tan^2) - 1) / 2, without the difference. Masking and shadowing of two
+   directions is the height-correlated 1 / (1 + Lambda + Lambda) [Hei14], for reflection and refraction. --- */
+
+static double pti_ggx_d(pti_d3 h, double a)
+{
+    double k = a * h.z * h.z + (h.x * h.x + h.y * h.y) / a;
+    return 1 / (PT_PI * k * k);
+}
+
+static double pti_ggx_lambda(pti_d3 w, double a)
+{
+    double t = a * a * (w.x * w.x + w.y * w.y) / (w.z * w.z);
+    return 0.5 * t / (1 + sqrt(1 + t));
+}
+
+/* Density of the visible normals D G1 (o . h) / cos [Hei18] 3, o above. */
+static double pti_ggx_visible(pti_d3 o, pti_d3 h, double a)
+{
+    return pti_ggx_d(h, a) * fmax(0, pti_d_dot(o, h)) / (o.z * (1 + pti_ggx_lambda(o, a)));
+}
+
+/* A visible normal: stretched by alpha the facets are a hemisphere, whose visible part, seen along o, reflects
+   into a spherical cap; a uniform point of the cap gives the normal half way to it [Dup23]. */
+static pti_d3 pti_ggx_visible_draw(pti_d3 o, double a, double u0, double u1)
+{
+    pti_d3 s = pti_d_normalize(pti_d(a * o.x, a * o.y, o.z)), h;
+    double phi = 2 * PT_PI * u0, z = (1 - u1) * (1 + s.z) - s.z, r = sqrt(fmax(0, (1 - z) * (1 + z)));
+    h = pti_d(s.x + r * cos(phi), s.y + r * sin(phi), s.z + z);
+    return pti_d_normalize(pti_d(a * h.x, a * h.y, h.z));
+}
+
+PTDEF double pt_ggx_d(pt_vec3 h, double alpha)
+{
+    return h.z > 0 ? pti_ggx_d(pti_d_from(h), alpha) : 0;
+}
+
+PTDEF double pt_ggx_g1(pt_vec3 w, double alpha)
+{
+    return w.z > 0 ? 1 / (1 + pti_ggx_lambda(pti_d_from(w), alpha)) : 0;
+}
+
+PTDEF double pt_ggx_visible_pdf_w(pt_vec3 wo, pt_vec3 h, double alpha)
+{
+    return wo.z > 0 && h.z > 0 ? pti_ggx_visible(pti_d_from(wo), pti_d_from(h), alpha) : 0;
+}
+
+PTDEF pt_vec3 pt_ggx_visible_sample(pt_vec3 wo, double alpha, pt_vec2 u)
+{
+    return pti_d_to(pti_ggx_visible_draw(pti_d_from(wo), alpha, (double)u.x, (double)u.y));
+}
+#endif
+
+#if PTI_HAS_TEXTURES
+/* --- textures --- */
+
+static pt_rgb pti_texel(const pt_texture *t, double x, double y)
+{
+    const float *c;
+    int column = (int)(x - t->width * floor(x / t->width)), row = (int)(y - t->height * floor(y / t->height));
+    if (column >= t->width) column = 0; /* rounding of a tiny negative x */
+    if (row >= t->height) row = 0;
+    c = t->rgb + 3 * ((size_t)row * (size_t)t->width + (size_t)column);
+    return pt_rgb3((pt_real)c[0], (pt_real)c[1], (pt_real)c[2]);
+}
+
+static pt_rgb pti_rgb_mix(pt_rgb a, pt_rgb b, double t)
+{
+    return pt_rgb3((pt_real)((1 - t) * (double)a.r + t * (double)b.r), (pt_real)((1 - t) * (double)a.g + t * (double)b.g),
+                   (pt_real)((1 - t) * (double)a.b + t * (double)b.b));
+}
+
+PTDEF pt_rgb pt_texture_eval(const pt_texture *t, pt_vec2 uv, pt_vec3 p)
+{
+    double u = (double)uv.x * (t->scale.x != 0 ? (double)t->scale.x : 1), v = (double)uv.y * (t->scale.y != 0 ? (double)t->scale.y : 1);
+    double x, y, fx, fy;
+    if (t->kind == PT_TEXTURE_FUNCTION) return t->function(t->user, uv, p);
+    if (t->kind == PT_TEXTURE_CHECKER) return fmod(floor(u) + floor(v), 2) == 0 ? t->a : t->b;
+    x = u * t->width - 0.5; /* the value of a pixel is that of its centre */
+    y = (1 - v) * t->height - 0.5;
+    fx = x - floor(x);
+    fy = y - floor(y);
+    x = floor(x);
+    y = floor(y);
+    return pti_rgb_mix(pti_rgb_mix(pti_texel(t, x, y), pti_texel(t, x + 1, y), fx),
+                       pti_rgb_mix(pti_texel(t, x, y + 1), pti_texel(t, x + 1, y + 1), fx), fy);
+}
+
+/* Texture coordinates of a hit: those of its shape; a sphere has longitude (from -z over +x) and latitude. */
+static pt_vec2 pti_hit_uv(const pt_hit *hit)
+{
+    pti_d3 n = pti_d_from(hit->ng);
+    if (hit->shape != PT_SHAPE_SPHERE) return hit->uv;
+    return pt_v2((pt_real)(0.5 + atan2(n.x, -n.z) / (2 * PT_PI)), (pt_real)(1 - acos(fmax(-1, fmin(1, n.y))) / PT_PI));
+}
+#endif
+
+#if PTI_HAS_MEASURED
+/* --- measured tables [Mat03], half vector and difference angles [Rus98] --- */
+
+enum { PTI_MERL_H = 90, PTI_MERL_D = 90, PTI_MERL_PHI = 180 };
+
+/* f = raw * scale. */
+static const double pti_merl_scale[3] = {1.0 / 1500, 1.15 / 1500, 1.66 / 1500};
+
+static int pti_clamp_int(double x, int most)
+{
+    return x > 0 ? (x < most ? (int)x : most) : 0;
+}
+
+/* The cell of two directions above the surface. */
+static int pti_merl_index(pti_d3 o, pti_d3 i)
+{
+    pti_d3 h = pti_d_normalize(pti_d_add(o, i)), d;
+    double s = sqrt(h.x * h.x + h.y * h.y), c = s > 0 ? h.x / s : 1, n = s > 0 ? h.y / s : 0, x, phi;
+    x = c * i.x + n * i.y;             /* wi turned by -phi_h about z, */
+    d = pti_d(h.z * x - s * i.z, c * i.y - n * i.x, s * x + h.z * i.z); /* then by -theta_h about y */
+    phi = atan2(d.y, d.x);
+    if (phi < 0) phi += PT_PI; /* reciprocity: phi_d and phi_d + pi are the same */
+    return pti_clamp_int(phi / PT_PI * PTI_MERL_PHI, PTI_MERL_PHI - 1) +
+           PTI_MERL_PHI * (pti_clamp_int(atan2(sqrt(d.x * d.x + d.y * d.y), d.z) * (2 / PT_PI) * PTI_MERL_D, PTI_MERL_D - 1) +
+                           PTI_MERL_D * pti_clamp_int(sqrt(atan2(s, h.z) * (2 / PT_PI)) * PTI_MERL_H, PTI_MERL_H - 1));
+}
+
+/* theta_h at the lower end of ring i. */
+static double pti_merl_theta_h(double i)
+{
+    return i * i / (PTI_MERL_H * PTI_MERL_H) * (PT_PI / 2);
+}
+
+PTDEF int pt_measured_index(pt_vec3 wo, pt_vec3 wi)
+{
+    return pti_merl_index(pti_d_from(wo), pti_d_from(wi));
+}
+
+static int pti_merl_directions(int index, pti_d3 *o, pti_d3 *i)
+{
+    double th = pti_merl_theta_h(index / (PTI_MERL_PHI * PTI_MERL_D) + 0.5);
+    double td = (index / PTI_MERL_PHI % PTI_MERL_D + 0.5) * (PT_PI / 2) / PTI_MERL_D, phi = (index % PTI_MERL_PHI + 0.5) * PT_PI / PTI_MERL_PHI;
+    pti_d3 d = pti_d(sin(td) * cos(phi), sin(td) * sin(phi), cos(td)), h = pti_d(sin(th), 0, cos(th));
+    *i = pti_d(h.z * d.x + h.x * d.z, d.y, h.z * d.z - h.x * d.x);
+    *o = pti_d_sub(pti_d_scale(h, 2 * cos(td)), *i);
+    return i->z > 0 && o->z > 0;
+}
+
+PTDEF int pt_measured_directions(int index, pt_vec3 *wo, pt_vec3 *wi)
+{
+    pti_d3 o, i;
+    int above = pti_merl_directions(index, &o, &i);
+    *wo = pti_d_to(o);
+    *wi = pti_d_to(i);
+    return above;
+}
+
+static pt_rgb pti_merl_value(const pt_measured *m, int index)
+{
+    const double *v = m->value + index;
+    return pt_rgb3((pt_real)(fmax(0, v[0]) * pti_merl_scale[0]), (pt_real)(fmax(0, v[PT_MEASURED_CELLS]) * pti_merl_scale[1]),
+                   (pt_real)(fmax(0, v[2 * PT_MEASURED_CELLS]) * pti_merl_scale[2]));
+}
+
+PTDEF pt_rgb pt_measured_eval(const pt_measured *m, pt_vec3 wo, pt_vec3 wi)
+{
+    return wo.z > 0 && wi.z > 0 ? pti_merl_value(m, pt_measured_index(wo, wi)) : pt_rgb_grey(0);
+}
+
+/* Solid angle of a ring of theta_h: 2 pi (cos a - cos b), without the difference. */
+static double pti_merl_ring(int i)
+{
+    double a = pti_merl_theta_h(i), b = pti_merl_theta_h(i + 1);
+    return 4 * PT_PI * sin(0.5 * (a + b)) * sin(0.5 * (b - a));
+}
+
+/* The distribution of theta_h from which directions are drawn: each ring by its mean value. */
+static void pti_merl_finish(pt_measured *m)
+{
+    const int ring = PTI_MERL_D * PTI_MERL_PHI;
+    int i, k;
+    m->cdf[0] = 0;
+    for (i = 0; i < PTI_MERL_H; i++) {
+        double sum = 0;
+        for (k = i * ring; k < (i + 1) * ring; k++) {
+            pt_rgb c = pti_merl_value(m, k);
+            sum += (double)c.r + (double)c.g + (double)c.b;
+        }
+        m->cdf[i + 1] = m->cdf[i] + sum * pti_merl_ring(i);
+    }
+    for (i = 0; i <= PTI_MERL_H; i++) m->cdf[i] = m->cdf[PTI_MERL_H] > 0 ? m->cdf[i] / m->cdf[PTI_MERL_H] : (double)i / PTI_MERL_H;
+    m->cdf[PTI_MERL_H] = 1;
+}
+
+static pt_result pti_merl_make(pt_measured *m)
+{
+    pt_measured_free(m);
+    m->value = (double *)pti_alloc(3 * (size_t)PT_MEASURED_CELLS, sizeof *m->value, m->alloc_user);
+    return m->value ? PT_OK : PT_ERROR_MEMORY;
+}
+
+static void pti_merl_set(pt_measured *m, int index, int measured, double r, double g, double b)
+{
+    m->value[index] = measured ? r / pti_merl_scale[0] : -1;
+    m->value[index + PT_MEASURED_CELLS] = measured ? g / pti_merl_scale[1] : -1;
+    m->value[index + 2 * PT_MEASURED_CELLS] = measured ? b / pti_merl_scale[2] : -1;
+}
+
+PTDEF pt_result pt_measured_fill(pt_measured *m, pt_brdf_fn f, void *user)
+{
+    pt_result result = pti_merl_make(m);
+    int i;
+    if (result != PT_OK) return result;
+    for (i = 0; i < PT_MEASURED_CELLS; i++) {
+        pt_vec3 wo, wi;
+        int above = pt_measured_directions(i, &wo, &wi);
+        pt_rgb c = above ? f(user, wo, wi) : pt_rgb_grey(0);
+        pti_merl_set(m, i, above, (double)c.r, (double)c.g, (double)c.b);
+    }
+    pti_merl_finish(m);
+    return PT_OK;
+}
+
+/* Index of a cell's block among blocks of b^3 cells. */
+static size_t pti_merl_block(int index, int b)
+{
+    size_t h = (size_t)(index / (PTI_MERL_PHI * PTI_MERL_D) / b), d = (size_t)(index / PTI_MERL_PHI % PTI_MERL_D / b);
+    return (size_t)(index % PTI_MERL_PHI / b) + (size_t)(PTI_MERL_PHI / b) * (d + (size_t)(PTI_MERL_D / b) * h);
+}
+
+PTDEF pt_result pt_measured_scatter(pt_measured *m, pt_scatter_fn scatter, void *user, uint64_t samples, int block,
+                                    uint64_t seed)
+{
+    pt_pcg32 random = pt_pcg32_make(seed, 0);
+    double *sums;
+    uint64_t s;
+    int i;
+    if (block < 1 || PTI_MERL_H % block != 0) return PT_ERROR_ARGUMENT;
+    sums = (double *)pti_alloc(4 * (size_t)(PT_MEASURED_CELLS / (block * block * block)), sizeof *sums, m->alloc_user);
+    if (!sums || pti_merl_make(m) != PT_OK) {
+        pti_free(sums, m->alloc_user);
+        return PT_ERROR_MEMORY;
+    }
+    memset(sums, 0, 4 * (size_t)(PT_MEASURED_CELLS / (block * block * block)) * sizeof *sums);
+    for (s = 0; s < samples; s++) {
+        pt_vec3 wo, wi;
+        pt_rgb w;
+        wo = pt_warp_cosine(pti_pcg32_pair(&random));
+        wi = pt_warp_cosine(pti_pcg32_pair(&random));
+        sums[4 * pti_merl_block(pt_measured_index(wo, wi), block) + 3] += 1; /* what the standard does */
+        if (scatter(user, wo, &random, &wi, &w) && wi.z > 0) {
+            double *sum = sums + 4 * pti_merl_block(pt_measured_index(wo, wi), block);
+            sum[0] += (double)w.r;
+            sum[1] += (double)w.g;
+            sum[2] += (double)w.b;
+        }
+    }
+    for (i = 0; i < PT_MEASURED_CELLS; i++) {
+        const double *sum = sums + 4 * pti_merl_block(i, block), n = PT_PI * sum[3];
+        pti_merl_set(m, i, n > 0, sum[0] / n, sum[1] / n, sum[2] / n);
+    }
+    pti_free(sums, m->alloc_user);
+    pti_merl_finish(m);
+    return PT_OK;
+}
+
+PTDEF void pt_measured_free(pt_measured *m)
+{
+    pti_free(m->value, m->alloc_user);
+    m->value = NULL;
+}
+#endif
+
+/* --- the BSDF of a hit --- */
+
+static int pti_is_smooth(const pt_material *m)
+{
+    return m->roughness == 0 || (m->kind == PT_MATERIAL_DIELECTRIC && m->ior == 1);
+}
+
+static double pti_ior(const pt_material *m)
+{
+    return m->ior > 0 ? (double)m->ior : 1.5;
+}
+
+static unsigned pti_material_lobes(const pt_material *m, pt_rgb albedo)
+{
+    unsigned base = pti_rgb_black(albedo) ? 0u : (unsigned)PT_LOBE_DIFFUSE;
+    switch (m->kind) {
+    case PT_MATERIAL_DIFFUSE:
+    case PT_MATERIAL_OREN_NAYAR: return base;
+    case PT_MATERIAL_MIRROR: return PT_LOBE_SPECULAR;
+    case PT_MATERIAL_DIELECTRIC:
+    case PT_MATERIAL_CONDUCTOR: return pti_is_smooth(m) ? PT_LOBE_SPECULAR : PT_LOBE_GLOSSY;
+    case PT_MATERIAL_PHONG:
+    case PT_MATERIAL_BLINN: return base | (pti_rgb_black(m->specular) ? 0u : (unsigned)PT_LOBE_GLOSSY);
+    case PT_MATERIAL_COAT: return base | PT_LOBE_SPECULAR;
+    case PT_MATERIAL_MEASURED: return PT_LOBE_GLOSSY;
+    }
+    return 0;
 }
 
 PTDEF pt_bsdf pt_bsdf_make(const pt_material *m, const pt_hit *hit)
@@ -3983,7 +4768,11 @@ PTDEF pt_bsdf pt_bsdf_make(const pt_material *m, const pt_hit *hit)
     b.material = m;
     b.frame = pt_frame_from_normal(hit->ns);
     b.ng = hit->ng;
-    b.lobes = pti_material_lobes(m);
+    b.albedo = m->albedo;
+#if PTI_HAS_TEXTURES
+    if (m->texture) b.albedo = pt_rgb_mul(b.albedo, pt_texture_eval(m->texture, pti_hit_uv(hit), hit->p));
+#endif
+    b.lobes = pti_material_lobes(m, b.albedo);
     return b;
 }
 
@@ -4000,18 +4789,332 @@ PTI_INLINE pt_real pti_reflection_cosine(const pt_bsdf *b, pt_vec3 wo, pt_vec3 w
     return c > 0 && side * pt_v3_dot(wi, b->ng) > 0 ? c : 0;
 }
 
+/* Two directions around the shading normal, mirrored so that wo is above; eta as seen from wo. */
+typedef struct pti_pair {
+    pti_d3 o, i;
+    double eta;
+} pti_pair;
+
+static pti_d3 pti_to_local(const pt_bsdf *b, pt_vec3 w, double side)
+{
+    pti_d3 d = pti_d_from(w);
+    return pti_d(pti_d_dot(d, pti_d_from(b->frame.s)), pti_d_dot(d, pti_d_from(b->frame.t)), side * pti_d_dot(d, pti_d_from(b->frame.n)));
+}
+
+/* From the local direction to the world's, on the side of ng that its z says: 0 if the shading normal and the
+   geometric one disagree about that. */
+static int pti_to_world(const pt_bsdf *b, pti_d3 local, double side, pt_vec3 *w)
+{
+    pti_d3 s = pti_d_scale(pti_d_from(b->frame.s), local.x), t = pti_d_scale(pti_d_from(b->frame.t), local.y);
+    *w = pti_d_to(pti_d_normalize(pti_d_add(pti_d_add(s, t), pti_d_scale(pti_d_from(b->frame.n), side * local.z))));
+    return side * local.z * (double)pt_v3_dot(*w, b->ng) > 0;
+}
+
+/* wo alone; 0 if it is below the shading normal. */
+static int pti_pair_begin(const pt_bsdf *b, pt_vec3 wo, pti_pair *p, double *side)
+{
+    *side = (double)pti_side(b, wo);
+    p->o = pti_to_local(b, wo, *side);
+    p->eta = *side > 0 ? pti_ior(b->material) : 1 / pti_ior(b->material);
+    return p->o.z > 0;
+}
+
+/* Both; 0 if the two normals disagree about their sides. */
+static int pti_pair_make(const pt_bsdf *b, pt_vec3 wo, pt_vec3 wi, pti_pair *p)
+{
+    double side;
+    if (!pti_pair_begin(b, wo, p, &side)) return 0;
+    p->i = pti_to_local(b, wi, side);
+    return p->i.z * side * (double)pt_v3_dot(wi, b->ng) > 0;
+}
+
+#if PTI_HAS_MICROFACET
+/* --- rough metal and glass --- */
+
+static double pti_alpha(const pt_bsdf *b)
+{
+    return (double)b->material->roughness * (double)b->material->roughness;
+}
+
+/* The half vector on o's side, of reflection or of refraction [Wal07] (16); 0 if it is no visible facet's. */
+static int pti_half_vector(const pti_pair *p, pti_d3 *h)
+{
+    int reflected = p->i.z > 0;
+    *h = pti_d_normalize(pti_d_add(p->o, pti_d_scale(p->i, reflected ? 1 : p->eta)));
+    if (h->z < 0) *h = pti_d_scale(*h, -1);
+    return pti_d_dot(p->o, *h) > 0 && (pti_d_dot(p->i, *h) > 0) == reflected;
+}
+
+/* Density of i per density of the half vector: [Wal07] (14) and (17). */
+static double pti_half_jacobian(const pti_pair *p, pti_d3 h)
+{
+    double oh = pti_d_dot(p->o, h), ih = pti_d_dot(p->i, h), d = oh + p->eta * ih;
+    return p->i.z > 0 ? 1 / (4 * oh) : p->eta * p->eta * fabs(ih) / (d * d);
+}
+
+static pt_rgb pti_conductor_fresnel(const pt_bsdf *b, double c)
+{
+    const pt_material *m = b->material;
+    pt_rgb f = pt_rgb3((pt_real)pt_fresnel_conductor(c, (double)m->eta.r, (double)m->k.r),
+                       (pt_real)pt_fresnel_conductor(c, (double)m->eta.g, (double)m->k.g),
+                       (pt_real)pt_fresnel_conductor(c, (double)m->eta.b, (double)m->k.b));
+    return pt_rgb_mul(f, b->albedo);
+}
+
+/* f of rough metal and rough glass: F D G2 / (4 cos cos) or [Wal07] (21), in which D G1 (o.h)/cos times the
+   Jacobian is the density, so that f = density * G2 / (G1 cos_i). */
+static pt_rgb pti_eval_microfacet(const pt_bsdf *b, const pti_pair *p, pt_transport mode)
+{
+    double a = pti_alpha(b), lo, f, r;
+    pti_d3 h;
+    if (b->material->kind == PT_MATERIAL_CONDUCTOR && p->i.z < 0) return pt_rgb_grey(0);
+    if (!pti_half_vector(p, &h)) return pt_rgb_grey(0);
+    lo = pti_ggx_lambda(p->o, a);
+    f = pti_ggx_visible(p->o, h, a) * pti_half_jacobian(p, h) * (1 + lo) / ((1 + lo + pti_ggx_lambda(p->i, a)) * fabs(p->i.z));
+    if (b->material->kind == PT_MATERIAL_CONDUCTOR) return pt_rgb_scale(pti_conductor_fresnel(b, pti_d_dot(p->o, h)), (pt_real)f);
+    r = pt_fresnel_make(pti_d_dot(p->o, h), p->eta).r;
+    if (p->i.z > 0) return pt_rgb_grey((pt_real)(f * r));
+    return pt_rgb_grey((pt_real)(f * (1 - r) / (mode == PT_RADIANCE ? p->eta * p->eta : 1))); /* [Vea97] 5.2 */
+}
+
+static double pti_pdf_microfacet(const pt_bsdf *b, const pti_pair *p)
+{
+    double f = 1;
+    pti_d3 h;
+    if (!pti_half_vector(p, &h)) return 0;
+    if (b->material->kind == PT_MATERIAL_DIELECTRIC) f = pt_fresnel_make(pti_d_dot(p->o, h), p->eta).r;
+    if (p->i.z < 0) f = b->material->kind == PT_MATERIAL_DIELECTRIC ? 1 - f : 0;
+    return f * pti_ggx_visible(p->o, h, pti_alpha(b)) * pti_half_jacobian(p, h);
+}
+
+static int pti_sample_microfacet(const pt_bsdf *b, pt_vec3 wo, double u_lobe, pt_vec2 u, pt_transport mode,
+                                 pt_bsdf_sample_result *out)
+{
+    double a = pti_alpha(b), side, c, lo, g, r = 1;
+    pt_fresnel f = {1, 1, 1, 0};
+    pti_pair p;
+    pti_d3 h;
+    if (!pti_pair_begin(b, wo, &p, &side)) return 0;
+    h = pti_ggx_visible_draw(p.o, a, (double)u.x, (double)u.y);
+    c = pti_d_dot(p.o, h);
+    if (!(c > 0)) return 0;
+    if (b->material->kind == PT_MATERIAL_DIELECTRIC) f = pt_fresnel_make(c, p.eta);
+    if (u_lobe < f.r) {
+        p.i = pti_d_sub(pti_d_scale(h, 2 * c), p.o);
+        if (!(p.i.z > 0)) return 0;
+        r = f.r;
+    } else {
+        p.i = pti_d_sub(pti_d_scale(h, c / p.eta - f.cos_t), pti_d_scale(p.o, 1 / p.eta));
+        if (!(p.i.z < 0)) return 0;
+        r = 1 - f.r;
+        out->eta = (pt_real)p.eta;
+    }
+    if (!pti_to_world(b, p.i, side, &out->wi)) return 0;
+    lo = pti_ggx_lambda(p.o, a);
+    g = (1 + lo) / (1 + lo + pti_ggx_lambda(p.i, a)); /* f cos / pdf = F G2 / G1 [Hei18] (19) */
+    if (p.i.z < 0 && mode == PT_RADIANCE) g /= p.eta * p.eta;
+    out->weight = b->material->kind == PT_MATERIAL_CONDUCTOR ? pt_rgb_scale(pti_conductor_fresnel(b, c), (pt_real)g) : pt_rgb_grey((pt_real)g);
+    out->pdf_w = (pt_real)(r * pti_ggx_visible(p.o, h, a) * pti_half_jacobian(&p, h));
+    out->pdf_rev_w = pt_bsdf_pdf_w(b, out->wi, wo, mode == PT_RADIANCE ? PT_IMPORTANCE : PT_RADIANCE);
+    out->lobe = PT_LOBE_GLOSSY;
+    return out->pdf_w > 0;
+}
+
+/* [Ore94] eq. 30 with sigma in radians: albedo/pi (A + B max(0, cos dphi) sin(a) tan(b)), a and b the larger and
+   the smaller angle. sin a tan b cos dphi = (x x + y y) / max(cos, cos). Its albedo reaches 1.007 of `albedo` at
+   grazing angles: the model is a fit. */
+static pt_rgb pti_eval_oren_nayar(const pt_bsdf *b, const pti_pair *p)
+{
+    double s2 = (double)b->material->roughness * (double)b->material->roughness;
+    double a = 1 - 0.5 * s2 / (s2 + 0.33), c = 0.45 * s2 / (s2 + 0.09), t = p->o.x * p->i.x + p->o.y * p->i.y;
+    return pt_rgb_scale(b->albedo, (pt_real)((a + c * fmax(0, t) / fmax(p->o.z, p->i.z)) / PT_PI));
+}
+#endif
+
+#if PTI_HAS_PHONG
+/* --- Phong and Blinn-Phong --- */
+
+/* cos^n of the glossy lobe, about the mirror direction or of the half vector, and the cosine o.h for the latter. */
+static double pti_phong_power(const pt_bsdf *b, const pti_pair *p, double *oh)
+{
+    pti_d3 h;
+    double c;
+    *oh = 1;
+    if (b->material->kind == PT_MATERIAL_PHONG) {
+        c = p->o.z * p->i.z - p->o.x * p->i.x - p->o.y * p->i.y;
+    } else {
+        h = pti_d_normalize(pti_d_add(p->o, p->i));
+        *oh = pti_d_dot(p->o, h);
+        c = h.z;
+    }
+    return c > 0 ? pow(fmin(1, c), (double)b->material->exponent) : 0;
+}
+
+/* (n+2)/(2 pi) [Laf94]; for the half vector the exact constant that makes the albedo 1 along the normal. */
+static double pti_phong_norm(const pt_bsdf *b)
+{
+    double n = (double)b->material->exponent;
+    if (b->material->kind == PT_MATERIAL_PHONG) return (n + 2) / (2 * PT_PI);
+    return (n + 2) * (n + 4) / (8 * PT_PI * (pow(2, -0.5 * n) + n));
+}
+
+/* How often the glossy lobe is drawn. */
+static double pti_phong_share(const pt_bsdf *b)
+{
+    const pt_rgb s = b->material->specular, a = b->albedo;
+    double glossy = fmax((double)s.r, fmax((double)s.g, (double)s.b)), diffuse = fmax((double)a.r, fmax((double)a.g, (double)a.b));
+    return glossy > 0 ? glossy / (glossy + diffuse) : 0;
+}
+
+static pt_rgb pti_eval_phong(const pt_bsdf *b, const pti_pair *p, unsigned lobes)
+{
+    double oh;
+    pt_rgb d = pt_rgb_grey(0), g = pt_rgb_grey(0);
+    if (lobes & PT_LOBE_DIFFUSE) d = pt_rgb_scale(b->albedo, PTI_R(1 / PT_PI));
+    if (lobes & PT_LOBE_GLOSSY) g = pt_rgb_scale(b->material->specular, (pt_real)(pti_phong_norm(b) * pti_phong_power(b, p, &oh)));
+    return pt_rgb_add(d, g);
+}
+
+/* (n+1)/(2 pi) cos^n, of the mirror direction or, over 4 o.h, of the half vector; and the cosine. */
+static double pti_pdf_phong(const pt_bsdf *b, const pti_pair *p)
+{
+    double share = pti_phong_share(b), oh, power = pti_phong_power(b, p, &oh), g;
+    g = ((double)b->material->exponent + 1) / (2 * PT_PI) * power;
+    if (b->material->kind == PT_MATERIAL_BLINN) g /= 4 * oh;
+    return share * g + (1 - share) * p->i.z / PT_PI;
+}
+
+/* A direction about the mirror direction, or reflected at a half vector, with density cos^n. */
+static pti_d3 pti_draw_phong(const pt_bsdf *b, pti_d3 o, pt_vec2 u)
+{
+    double c = pow(1 - (double)u.x, 1 / ((double)b->material->exponent + 1)), s = sqrt((1 - c) * (1 + c)), phi = 2 * PT_PI * (double)u.y;
+    pti_d3 l = pti_d(s * cos(phi), s * sin(phi), c), f[3];
+    pt_frame frame;
+    if (b->material->kind == PT_MATERIAL_BLINN) return pti_d_sub(pti_d_scale(l, 2 * pti_d_dot(o, l)), o);
+    frame = pt_frame_from_normal(pti_d_to(pti_d(-o.x, -o.y, o.z)));
+    f[0] = pti_d_scale(pti_d_from(frame.s), l.x);
+    f[1] = pti_d_scale(pti_d_from(frame.t), l.y);
+    f[2] = pti_d_scale(pti_d_from(frame.n), l.z);
+    return pti_d_normalize(pti_d_add(f[0], pti_d_add(f[1], f[2])));
+}
+#endif
+
+#if PTI_HAS_COAT
+/* --- coat: what the interface lets through is scattered by the base and reflected back to it any number of times:
+   (1-F_o)(1-F_i) albedo / (pi n^2 (1 - albedo R)), R the inner reflectance of diffuse light. With albedo 1 the
+   whole reflects exactly 1: the diffuse transmission (1 - R_outer)/n^2 is 1 - R. --- */
+
+static pt_rgb pti_coat_base(const pt_bsdf *b, double r)
+{
+    pt_rgb a = b->albedo;
+    return pt_rgb3((pt_real)((double)a.r / (1 - (double)a.r * r)), (pt_real)((double)a.g / (1 - (double)a.g * r)),
+                   (pt_real)((double)a.b / (1 - (double)a.b * r)));
+}
+
+static pt_rgb pti_eval_coat(const pt_bsdf *b, const pti_pair *p)
+{
+    double n = pti_ior(b->material), r = pt_fresnel_diffuse(1 / n);
+    double t = (1 - pt_fresnel_make(p->o.z, n).r) * (1 - pt_fresnel_make(p->i.z, n).r);
+    return pt_rgb_scale(pti_coat_base(b, r), (pt_real)(t / (PT_PI * n * n)));
+}
+
+/* How often the interface is drawn: by its share of what is reflected. */
+static double pti_coat_share(const pt_bsdf *b, double cos_o)
+{
+    double n = pti_ior(b->material), r = pt_fresnel_diffuse(1 / n), f = pt_fresnel_make(cos_o, n).r;
+    pt_rgb a = pti_coat_base(b, r);
+    return f / (f + (1 - f) * (1 - r) * fmax((double)a.r, fmax((double)a.g, (double)a.b)));
+}
+#endif
+
+#if PTI_HAS_MEASURED
+/* --- measured: half of the directions by the cosine, half by the half vector --- */
+
+static double pti_pdf_measured(const pt_bsdf *b, const pti_pair *p)
+{
+    pti_d3 h = pti_d_normalize(pti_d_add(p->o, p->i));
+    int ring = pti_clamp_int(sqrt(atan2(sqrt(h.x * h.x + h.y * h.y), h.z) * (2 / PT_PI)) * PTI_MERL_H, PTI_MERL_H - 1);
+    double ph = (b->material->measured->cdf[ring + 1] - b->material->measured->cdf[ring]) / pti_merl_ring(ring);
+    return 0.5 * p->i.z / PT_PI + 0.5 * ph / (4 * pti_d_dot(p->o, h));
+}
+
+static pti_d3 pti_draw_measured(const pt_bsdf *b, pti_d3 o, pt_vec2 u)
+{
+    const double *cdf = b->material->measured->cdf;
+    double phi = 2 * PT_PI * (double)u.y, x, c, s;
+    pti_d3 h;
+    int i = 0;
+    while (i < PTI_MERL_H - 1 && (double)u.x >= cdf[i + 1]) i++;
+    x = ((double)u.x - cdf[i]) / (cdf[i + 1] - cdf[i]); /* uniform in the ring: in 1 - cos = 2 sin^2(theta/2) */
+    s = sin(0.5 * pti_merl_theta_h(i));
+    c = sin(0.5 * pti_merl_theta_h(i + 1));
+    x = (1 - x) * s * s + x * c * c;
+    c = 1 - 2 * x;
+    s = 2 * sqrt(x * (1 - x));
+    h = pti_d(s * cos(phi), s * sin(phi), c);
+    return pti_d_sub(pti_d_scale(h, 2 * pti_d_dot(o, h)), o);
+}
+#endif
+
 PTDEF pt_rgb pt_bsdf_eval(const pt_bsdf *b, pt_vec3 wo, pt_vec3 wi, pt_transport mode, unsigned lobes)
 {
+    const pt_rgb black = pt_rgb_grey(0);
+    pti_pair p;
     (void)mode;
-    if (!(b->lobes & lobes & PT_LOBE_DIFFUSE) || !(pti_reflection_cosine(b, wo, wi) > 0)) return pt_rgb_grey(0);
-    return pt_rgb_scale(b->material->albedo, PTI_R(1 / PT_PI));
+    lobes &= b->lobes;
+    if (!(lobes & (PT_LOBE_DIFFUSE | PT_LOBE_GLOSSY))) return black;
+    if (b->material->kind == PT_MATERIAL_DIFFUSE)
+        return pti_reflection_cosine(b, wo, wi) > 0 ? pt_rgb_scale(b->albedo, PTI_R(1 / PT_PI)) : black;
+    if (!pti_pair_make(b, wo, wi, &p)) return black;
+#if PTI_HAS_MICROFACET
+    if (b->material->kind == PT_MATERIAL_CONDUCTOR || b->material->kind == PT_MATERIAL_DIELECTRIC) return pti_eval_microfacet(b, &p, mode);
+#endif
+    if (p.i.z < 0) return black; /* the rest reflect only */
+    switch (b->material->kind) {
+#if PTI_HAS_MICROFACET
+    case PT_MATERIAL_OREN_NAYAR: return pti_eval_oren_nayar(b, &p);
+#endif
+#if PTI_HAS_PHONG
+    case PT_MATERIAL_PHONG:
+    case PT_MATERIAL_BLINN: return pti_eval_phong(b, &p, lobes);
+#endif
+#if PTI_HAS_COAT
+    case PT_MATERIAL_COAT: return lobes & PT_LOBE_DIFFUSE ? pti_eval_coat(b, &p) : black;
+#endif
+#if PTI_HAS_MEASURED
+    case PT_MATERIAL_MEASURED: return pt_rgb_mul(pti_merl_value(b->material->measured, pti_merl_index(p.o, p.i)), b->albedo);
+#endif
+    default: return black;
+    }
 }
 
 PTDEF pt_real pt_bsdf_pdf_w(const pt_bsdf *b, pt_vec3 wo, pt_vec3 wi, pt_transport mode)
 {
+    pti_pair p;
     (void)mode;
-    if (!(b->lobes & PT_LOBE_DIFFUSE)) return 0;
-    return pt_warp_cosine_pdf_w(pt_v3(0, 0, pti_reflection_cosine(b, wo, wi)));
+    if (!(b->lobes & (PT_LOBE_DIFFUSE | PT_LOBE_GLOSSY))) return 0;
+    if (b->material->kind == PT_MATERIAL_DIFFUSE) return pt_warp_cosine_pdf_w(pt_v3(0, 0, pti_reflection_cosine(b, wo, wi)));
+    if (!pti_pair_make(b, wo, wi, &p)) return 0;
+#if PTI_HAS_MICROFACET
+    if (b->material->kind == PT_MATERIAL_CONDUCTOR || b->material->kind == PT_MATERIAL_DIELECTRIC) return (pt_real)pti_pdf_microfacet(b, &p);
+#endif
+    if (p.i.z < 0) return 0;
+    switch (b->material->kind) {
+#if PTI_HAS_MICROFACET
+    case PT_MATERIAL_OREN_NAYAR: return (pt_real)(p.i.z / PT_PI);
+#endif
+#if PTI_HAS_PHONG
+    case PT_MATERIAL_PHONG:
+    case PT_MATERIAL_BLINN: return (pt_real)pti_pdf_phong(b, &p);
+#endif
+#if PTI_HAS_COAT
+    case PT_MATERIAL_COAT: return (pt_real)((1 - pti_coat_share(b, p.o.z)) * p.i.z / PT_PI);
+#endif
+#if PTI_HAS_MEASURED
+    case PT_MATERIAL_MEASURED: return (pt_real)pti_pdf_measured(b, &p);
+#endif
+    default: return 0;
+    }
 }
 
 static int pti_sample_diffuse(const pt_bsdf *b, pt_vec3 wo, pt_vec2 u, pt_bsdf_sample_result *out)
@@ -4019,7 +5122,7 @@ static int pti_sample_diffuse(const pt_bsdf *b, pt_vec3 wo, pt_vec2 u, pt_bsdf_s
     pt_vec3 local = pt_warp_cosine(u);
     local.z *= pti_side(b, wo);
     out->wi = pt_frame_to_world(&b->frame, local);
-    out->weight = b->material->albedo;
+    out->weight = b->albedo;
     out->pdf_w = pt_bsdf_pdf_w(b, wo, out->wi, PT_RADIANCE);
     out->pdf_rev_w = pt_bsdf_pdf_w(b, out->wi, wo, PT_RADIANCE);
     out->lobe = PT_LOBE_DIFFUSE;
@@ -4049,7 +5152,7 @@ static int pti_sample_reflection(const pt_bsdf *b, pt_vec3 wo, pti_d3 n, double 
 static int pti_sample_dielectric(const pt_bsdf *b, pt_vec3 wo, double u_lobe, pt_transport mode,
                                  pt_bsdf_sample_result *out)
 {
-    double ior = b->material->ior > 0 ? (double)b->material->ior : 1.5, cos_o, cos_t, f, eta;
+    double ior = pti_ior(b->material), cos_o, cos_t, f, eta;
     pti_d3 n = pti_specular_normal(b, wo, &cos_o), w;
     eta = pti_side(b, wo) > 0 ? ior : 1 / ior;
     f = pt_fresnel_dielectric(cos_o, eta, &cos_t);
@@ -4066,20 +5169,89 @@ static int pti_sample_dielectric(const pt_bsdf *b, pt_vec3 wo, double u_lobe, pt
     return pti_side(b, wo) * pt_v3_dot(out->wi, b->ng) < 0;
 }
 
+#if PTI_HAS_MICROFACET || PTI_HAS_PHONG || PTI_HAS_COAT || PTI_HAS_MEASURED
+/* A direction of one lobe with the weight f cos / pdf of the whole: `glossy` by `draw`, otherwise by the cosine. */
+static int pti_sample_mixture(const pt_bsdf *b, pt_vec3 wo, pt_vec2 u, pti_d3 (*draw)(const pt_bsdf *, pti_d3, pt_vec2), unsigned lobe,
+                              pt_bsdf_sample_result *out)
+{
+    double side, k;
+    pt_vec3 cosine;
+    pti_pair p;
+    if (!pti_pair_begin(b, wo, &p, &side)) return 0;
+    cosine = pt_warp_cosine(u);
+    p.i = draw ? draw(b, p.o, u) : pti_d_from(cosine);
+    if (!(p.i.z > 0) || !pti_to_world(b, p.i, side, &out->wi)) return 0;
+    out->pdf_w = pt_bsdf_pdf_w(b, wo, out->wi, PT_RADIANCE);
+    out->pdf_rev_w = pt_bsdf_pdf_w(b, out->wi, wo, PT_RADIANCE);
+    if (!(out->pdf_w > 0)) return 0;
+    k = fabs((double)pt_v3_dot(out->wi, b->frame.n)) / (double)out->pdf_w;
+    out->weight = pt_rgb_scale(pt_bsdf_eval(b, wo, out->wi, PT_RADIANCE, PT_LOBE_ALL), (pt_real)k);
+    out->lobe = lobe;
+    return 1;
+}
+#endif
+
+#if PTI_HAS_COAT
+static int pti_sample_coat(const pt_bsdf *b, pt_vec3 wo, double u_lobe, pt_vec2 u, pt_bsdf_sample_result *out)
+{
+    double cos_o, share;
+    pti_d3 n = pti_specular_normal(b, wo, &cos_o);
+    share = pti_coat_share(b, cos_o);
+    if (!(u_lobe < share)) return pti_sample_mixture(b, wo, u, NULL, PT_LOBE_DIFFUSE, out);
+    out->pdf_w = out->pdf_rev_w = (pt_real)share;
+    out->weight = pt_rgb_grey((pt_real)(pt_fresnel_make(cos_o, pti_ior(b->material)).r / share));
+    return pti_sample_reflection(b, wo, n, cos_o, out);
+}
+#endif
+
+/* A mirror, or smooth metal. */
+static int pti_sample_mirror(const pt_bsdf *b, pt_vec3 wo, pt_bsdf_sample_result *out)
+{
+    double cos_o;
+    pti_d3 n = pti_specular_normal(b, wo, &cos_o);
+    out->weight = b->albedo;
+#if PTI_HAS_MICROFACET
+    if (b->material->kind == PT_MATERIAL_CONDUCTOR) out->weight = pti_conductor_fresnel(b, cos_o);
+#endif
+    out->pdf_w = out->pdf_rev_w = 1;
+    return pti_sample_reflection(b, wo, n, cos_o, out);
+}
+
 PTDEF int pt_bsdf_sample(const pt_bsdf *b, pt_vec3 wo, double u_lobe, pt_vec2 u, pt_transport mode,
                          pt_bsdf_sample_result *out)
 {
-    pti_d3 n;
-    double cos_o;
     if (!b->lobes) return 0;
     out->eta = 1;
-    if (b->material->kind == PT_MATERIAL_DIFFUSE) return pti_sample_diffuse(b, wo, u, out);
     out->weight = pt_rgb_grey(1);
-    if (b->material->kind == PT_MATERIAL_DIELECTRIC) return pti_sample_dielectric(b, wo, u_lobe, mode, out);
-    out->weight = b->material->albedo;
-    out->pdf_w = out->pdf_rev_w = 1;
-    n = pti_specular_normal(b, wo, &cos_o);
-    return pti_sample_reflection(b, wo, n, cos_o, out);
+    switch (b->material->kind) {
+    case PT_MATERIAL_DIFFUSE: return pti_sample_diffuse(b, wo, u, out);
+    case PT_MATERIAL_DIELECTRIC:
+        if (b->lobes & PT_LOBE_SPECULAR) return pti_sample_dielectric(b, wo, u_lobe, mode, out);
+        break;
+#if PTI_HAS_MICROFACET
+    case PT_MATERIAL_OREN_NAYAR: return pti_sample_mixture(b, wo, u, NULL, PT_LOBE_DIFFUSE, out);
+#endif
+#if PTI_HAS_PHONG
+    case PT_MATERIAL_PHONG:
+    case PT_MATERIAL_BLINN:
+        if (u_lobe < pti_phong_share(b)) return pti_sample_mixture(b, wo, u, pti_draw_phong, PT_LOBE_GLOSSY, out);
+        return pti_sample_mixture(b, wo, u, NULL, PT_LOBE_DIFFUSE, out);
+#endif
+#if PTI_HAS_COAT
+    case PT_MATERIAL_COAT: return pti_sample_coat(b, wo, u_lobe, u, out);
+#endif
+#if PTI_HAS_MEASURED
+    case PT_MATERIAL_MEASURED: return pti_sample_mixture(b, wo, u, u_lobe < 0.5 ? pti_draw_measured : NULL, PT_LOBE_GLOSSY, out);
+#endif
+    default:
+        if (b->lobes & PT_LOBE_SPECULAR) return pti_sample_mirror(b, wo, out);
+        break;
+    }
+#if PTI_HAS_MICROFACET
+    return pti_sample_microfacet(b, wo, u_lobe, u, mode, out);
+#else
+    return 0;
+#endif
 }
 
 /* =====================================================================================================
@@ -4201,32 +5373,143 @@ static int pti_sample_sphere_light(const pt_sphere *s, pt_vec3 p, pt_vec2 u, pt_
     return t > 0;
 }
 
-#if PTI_HAS_ENVIRONMENT
-static void pti_sample_environment(const pt_scene *scene, pt_vec3 p, pt_vec2 u, pt_light_sample_result *out)
+/* Larger than the scene, seen from p. */
+static pt_real pti_far_distance(const pt_scene *scene, pt_vec3 p)
 {
-    pt_vec3 size = pt_v3_sub(scene->hi, scene->lo);
-    out->wi = pt_warp_sphere(u);
-    out->distance = 2 * pt_v3_length(size) + pt_v3_length(pt_v3_sub(p, scene->lo));
-    out->p = pt_v3_add(p, pt_v3_scale(out->wi, out->distance));
-    out->p_error = out->n = pt_v3(0, 0, 0);
-    out->pdf_w = (double)pt_warp_sphere_pdf_w();
+    return 2 * pt_v3_length(pt_v3_sub(scene->hi, scene->lo)) + pt_v3_length(pt_v3_sub(p, scene->lo));
+}
+
+#if PTI_HAS_ENVIRONMENT
+/* --- environment image: pixel (x, y) is a rectangle of azimuth and polar angle; its solid angle is
+   2 pi / width (cos a - cos b). A row is drawn by the light in it, then a column, then a point that is uniform in
+   solid angle: the density is the pixel's share of the light over its solid angle, whatever the resolution. --- */
+
+static double pti_map_solid_angle(const pt_environment_map *m, int y)
+{
+    double a = PT_PI * y / m->height, b = PT_PI * (y + 1) / m->height;
+    return 4 * PT_PI / m->width * sin(0.5 * (a + b)) * sin(0.5 * (b - a));
+}
+
+/* The pixel that a direction is in. */
+static void pti_map_pixel(const pt_environment_map *m, pt_vec3 w, int *x, int *y)
+{
+    pti_d3 d = pti_d_from(w);
+    *x = (int)((0.5 + atan2(d.x, -d.z) / (2 * PT_PI)) * m->width);
+    *y = (int)(atan2(sqrt(d.x * d.x + d.z * d.z), d.y) / PT_PI * m->height);
+    if (*x >= m->width) *x = 0; /* azimuth pi is -pi */
+    if (*y >= m->height) *y = m->height - 1;
+}
+
+static pt_rgb pti_map_value(const pt_environment_map *m, int x, int y)
+{
+    const float *c = m->rgb + 3 * ((size_t)y * (size_t)m->width + (size_t)x);
+    return pt_rgb3((pt_real)((double)c[0] * m->scale), (pt_real)((double)c[1] * m->scale), (pt_real)((double)c[2] * m->scale));
+}
+
+static double pti_map_pdf_w(const pt_environment_map *m, int x, int y)
+{
+    const double *columns = m->columns + (size_t)y * ((size_t)m->width + 1);
+    return (m->rows[y + 1] - m->rows[y]) * (columns[x + 1] - columns[x]) / pti_map_solid_angle(m, y);
+}
+
+/* The interval of a cumulative list (count + 1 numbers from 0 to 1) that holds u, and where in it u lies. */
+static int pti_find_interval(const double *cdf, int count, double u, double *rest)
+{
+    int lo = 0, hi = count;
+    while (hi - lo > 1) {
+        int middle = lo + (hi - lo) / 2;
+        if (cdf[middle] <= u) lo = middle;
+        else hi = middle;
+    }
+    *rest = cdf[hi] > cdf[lo] ? fmin(1, (u - cdf[lo]) / (cdf[hi] - cdf[lo])) : 0.5;
+    return lo;
+}
+
+static pt_vec3 pti_map_draw(const pt_environment_map *m, pt_vec2 u, int *x, int *y)
+{
+    double fx, fy, a, b, z, s, phi;
+    *y = pti_find_interval(m->rows, m->height, (double)u.x, &fy);
+    *x = pti_find_interval(m->columns + (size_t)*y * ((size_t)m->width + 1), m->width, (double)u.y, &fx);
+    a = sin(0.5 * PT_PI * *y / m->height);
+    b = sin(0.5 * PT_PI * (*y + 1) / m->height);
+    z = (1 - fy) * a * a + fy * b * b; /* (1 - cos theta) / 2 */
+    s = 2 * sqrt(z * (1 - z));
+    phi = 2 * PT_PI * ((*x + fx) / m->width - 0.5);
+    return pti_d_to(pti_d(s * sin(phi), 1 - 2 * z, -s * cos(phi)));
+}
+
+PTDEF pt_rgb pt_environment_radiance(const pt_scene *scene, pt_vec3 w)
+{
+    int x, y;
+    if (!scene->map.rgb) return scene->environment;
+    pti_map_pixel(&scene->map, w, &x, &y);
+    return pti_map_value(&scene->map, x, y);
+}
+
+/* Density of a direction from the environment. */
+static double pti_environment_pdf_w(const pt_scene *scene, pt_vec3 w)
+{
+    int x, y;
+    if (!scene->map.rgb) return (double)pt_warp_sphere_pdf_w();
+    pti_map_pixel(&scene->map, w, &x, &y);
+    return pti_map_pdf_w(&scene->map, x, y);
+}
+
+/* A direction from the environment with its radiance and density. */
+static pt_vec3 pti_environment_draw(const pt_scene *scene, pt_vec2 u, pt_rgb *radiance, double *pdf_w)
+{
+    pt_vec3 w;
+    int x, y;
+    if (scene->map.rgb) {
+        w = pti_map_draw(&scene->map, u, &x, &y);
+        pti_map_pixel(&scene->map, w, &x, &y); /* as everybody else will look it up: rounding may cross an edge */
+        *radiance = pti_map_value(&scene->map, x, y);
+        *pdf_w = pti_map_pdf_w(&scene->map, x, y);
+        return w;
+    }
+    *radiance = scene->environment;
+    *pdf_w = (double)pt_warp_sphere_pdf_w();
+    return pt_warp_sphere(u);
 }
 #endif
+
+static void pti_sample_infinite(const pt_scene *scene, const pt_light *light, pt_vec3 p, pt_vec2 u, pt_light_sample_result *out)
+{
+    out->infinite = 1;
+    out->distance = pti_far_distance(scene, p);
+    out->p_error = out->n = pt_v3(0, 0, 0);
+    out->delta = light->kind == PT_LIGHT_DIRECTIONAL;
+    out->pdf_w = 1;
+    out->wi = pt_v3_neg(light->direction);
+#if PTI_HAS_ENVIRONMENT
+    if (!out->delta) out->wi = pti_environment_draw(scene, u, &out->radiance, &out->pdf_w);
+#endif
+    (void)u;
+    out->p = pt_v3_add(p, pt_v3_scale(out->wi, out->distance));
+}
+
+/* Intensity of a point or spot light in direction w, which goes away from it. */
+static pt_rgb pti_intensity(const pt_light *light, pt_vec3 w)
+{
+    if (light->kind != PT_LIGHT_SPOT) return light->emission;
+    return pt_rgb_scale(light->emission, (pt_real)pt_spot_falloff((double)pt_v3_dot(w, light->direction), light->cos_start, light->cos_end));
+}
 
 static int pti_sample_point_light(const pt_light *light, pt_vec3 p, pt_light_sample_result *out)
 {
     pti_d3 d = pti_d_between(p, light->position);
     double d2 = pti_d_dot(d, d);
+    pt_rgb i;
     if (!(d2 > 0)) return 0;
     out->wi = pti_d_to(pti_d_normalize(d));
     out->distance = (pt_real)sqrt(d2);
     out->p = light->position;
     out->p_error = out->n = pt_v3(0, 0, 0);
-    out->radiance = pt_rgb3((pt_real)((double)light->emission.r / d2), (pt_real)((double)light->emission.g / d2),
-                            (pt_real)((double)light->emission.b / d2));
+    i = pti_intensity(light, pt_v3_neg(out->wi));
+    out->radiance = pt_rgb3((pt_real)((double)i.r / d2), (pt_real)((double)i.g / d2), (pt_real)((double)i.b / d2));
     out->pdf_w = 1;
     out->delta = 1;
-    return 1;
+    return !pti_rgb_black(i);
 }
 
 PTDEF int pt_light_sample(const pt_scene *scene, int light, pt_vec3 p, pt_vec2 u, pt_light_sample_result *out)
@@ -4235,27 +5518,28 @@ PTDEF int pt_light_sample(const pt_scene *scene, int light, pt_vec3 p, pt_vec2 u
     const pt_primitive *primitive;
     if (light < 0 || (uint32_t)light >= scene->light_count) return 0;
     l = &scene->lights[light];
-    out->delta = 0;
+    out->delta = out->infinite = 0;
     out->radiance = l->emission;
-    if (l->kind == PT_LIGHT_POINT) return pti_sample_point_light(l, p, out);
-#if PTI_HAS_ENVIRONMENT
-    if (l->kind == PT_LIGHT_ENVIRONMENT) {
-        pti_sample_environment(scene, p, u, out);
+    if (l->kind == PT_LIGHT_POINT || l->kind == PT_LIGHT_SPOT) return pti_sample_point_light(l, p, out);
+    if (l->kind != PT_LIGHT_AREA) {
+        pti_sample_infinite(scene, l, p, u, out);
         return 1;
     }
-#endif
     primitive = &scene->primitives[l->primitive];
     if (primitive->shape == PT_SHAPE_SPHERE) return pti_sample_sphere_light(&scene->spheres[primitive->index], p, u, out);
     return pti_sample_flat(scene, primitive, p, u, out);
 }
 
-PTDEF double pt_light_pdf_w(const pt_scene *scene, int light, pt_vec3 p, const pt_hit *hit)
+PTDEF double pt_light_pdf_w(const pt_scene *scene, int light, pt_vec3 p, pt_vec3 w, const pt_hit *hit)
 {
     const pt_primitive *primitive;
     pti_flat f;
-    if (light < 0 || (uint32_t)light >= scene->light_count || scene->lights[light].kind == PT_LIGHT_POINT) return 0;
-    if (scene->lights[light].kind == PT_LIGHT_ENVIRONMENT) return hit ? 0 : (double)pt_warp_sphere_pdf_w();
-    if (!hit || hit->primitive != scene->lights[light].primitive) return 0;
+    (void)w;
+    if (light < 0 || (uint32_t)light >= scene->light_count) return 0;
+#if PTI_HAS_ENVIRONMENT
+    if (scene->lights[light].kind == PT_LIGHT_ENVIRONMENT) return hit ? 0 : pti_environment_pdf_w(scene, w);
+#endif
+    if (scene->lights[light].kind != PT_LIGHT_AREA || !hit || hit->primitive != scene->lights[light].primitive) return 0;
     primitive = &scene->primitives[hit->primitive];
     if (primitive->shape == PT_SHAPE_SPHERE) {
         const pt_sphere *s = &scene->spheres[primitive->index];
@@ -4304,39 +5588,53 @@ static void pti_le_area(const pt_scene *scene, const pt_light *l, pt_vec2 u_p, p
     out->cos_n = fabs((double)local.z);
 }
 
-#if PTI_HAS_ENVIRONMENT
-static void pti_le_environment(const pt_scene *scene, pt_vec2 u_p, pt_vec2 u_w, pt_light_emission_result *out)
+/* From a disk across the direction, as wide as the scene and before it. */
+static void pti_le_infinite(const pt_scene *scene, const pt_light *l, pt_vec2 u_p, pt_vec2 u_w, pt_light_emission_result *out)
 {
     pti_d3 centre = pti_d_scale(pti_d_add(pti_d_from(scene->lo), pti_d_from(scene->hi)), 0.5);
     double r = pti_scene_radius(scene);
     pt_vec2 disk = pt_warp_disk(u_p);
     pt_frame frame;
-    out->w = pt_warp_sphere(u_w);
+    out->w = l->direction;
+#if PTI_HAS_ENVIRONMENT
+    if (l->kind == PT_LIGHT_ENVIRONMENT) {
+        double pdf_w;
+        out->w = pt_v3_neg(pti_environment_draw(scene, u_w, &out->radiance, &pdf_w));
+    }
+#endif
+    (void)u_w;
     frame = pt_frame_from_normal(out->w);
     out->p = pti_d_to(pti_d_add(centre, pti_d_scale(pti_d_from(pt_frame_to_world(&frame, pt_v3(disk.x, disk.y, -1))), r)));
-    out->p_error = out->n = pt_v3(0, 0, 0);
-    out->cos_n = 1;
 }
-#endif
+
+/* 1 - cos of the half angle of a spot light. */
+static double pti_spot_omc(const pt_light *l)
+{
+    return 1 - l->cos_end;
+}
 
 PTDEF int pt_light_sample_le(const pt_scene *scene, int light, pt_vec2 u_p, pt_vec2 u_w, pt_real u_side,
                              pt_light_emission_result *out)
 {
     const pt_light *l;
+    pt_frame frame;
     if (light < 0 || (uint32_t)light >= scene->light_count) return 0;
     l = &scene->lights[light];
     out->radiance = l->emission;
+    out->p_error = out->n = pt_v3(0, 0, 0);
+    out->cos_n = 1;
     if (l->kind == PT_LIGHT_AREA) {
         pti_le_area(scene, l, u_p, u_w, u_side, out);
-#if PTI_HAS_ENVIRONMENT
-    } else if (l->kind == PT_LIGHT_ENVIRONMENT) {
-        pti_le_environment(scene, u_p, u_w, out);
-#endif
-    } else {
+    } else if (l->kind == PT_LIGHT_POINT || l->kind == PT_LIGHT_SPOT) {
         out->p = l->position;
-        out->p_error = out->n = pt_v3(0, 0, 0);
         out->w = pt_warp_sphere(u_w);
-        out->cos_n = 1;
+        if (l->kind == PT_LIGHT_SPOT) {
+            frame = pt_frame_from_normal(l->direction);
+            out->w = pt_frame_to_world(&frame, pt_warp_cone(u_w, pti_spot_omc(l)));
+            out->radiance = pti_intensity(l, out->w);
+        }
+    } else {
+        pti_le_infinite(scene, l, u_p, u_w, out);
     }
     pt_light_pdf_le(scene, light, out->n, out->w, &out->pdf_a, &out->pdf_w);
     return out->pdf_w > 0;
@@ -4348,11 +5646,22 @@ PTDEF void pt_light_pdf_le(const pt_scene *scene, int light, pt_vec3 n, pt_vec3 
     double r = pti_scene_radius(scene), c = (double)pt_v3_dot(n, w);
     *pdf_a = 1;
     *pdf_w = (double)pt_warp_sphere_pdf_w();
-    if (l->kind == PT_LIGHT_ENVIRONMENT) *pdf_a = 1 / (PT_PI * r * r);
-    if (l->kind != PT_LIGHT_AREA) return;
-    *pdf_a = 1 / l->area;
-    if (scene->primitives[l->primitive].shape == PT_SHAPE_SPHERE) *pdf_w = fabs(c) / (2 * PT_PI); /* both sides */
-    else *pdf_w = fmax(0, c) / PT_PI;
+    switch (l->kind) {
+    case PT_LIGHT_POINT: return;
+    case PT_LIGHT_SPOT: *pdf_w = (double)pt_v3_dot(w, l->direction) > l->cos_end ? pt_warp_cone_pdf_w(pti_spot_omc(l)) : 0; return;
+    case PT_LIGHT_DIRECTIONAL: *pdf_w = 1; break;
+    case PT_LIGHT_ENVIRONMENT:
+#if PTI_HAS_ENVIRONMENT
+        *pdf_w = pti_environment_pdf_w(scene, pt_v3_neg(w));
+#endif
+        break;
+    case PT_LIGHT_AREA:
+        *pdf_a = 1 / l->area;
+        if (scene->primitives[l->primitive].shape == PT_SHAPE_SPHERE) *pdf_w = fabs(c) / (2 * PT_PI); /* both sides */
+        else *pdf_w = fmax(0, c) / PT_PI;
+        return;
+    }
+    *pdf_a = 1 / (PT_PI * r * r);
 }
 
 PTDEF pt_rgb pt_hit_emission(const pt_scene *scene, const pt_hit *hit, pt_vec3 wo)
@@ -4523,15 +5832,93 @@ static int pti_check_rgb(pt_scene *scene, const char *item, uint32_t number, con
     return 1;
 }
 
+#if PTI_HAS_TEXTURES || PTI_HAS_ENVIRONMENT
+/* 1 if every value is finite and not negative. */
+static int pti_check_pixels(pt_scene *scene, const char *item, uint32_t number, const float *rgb, size_t count, double max)
+{
+    size_t i;
+    for (i = 0; i < count; i++)
+        if (!(rgb[i] >= 0 && (double)rgb[i] <= max) || !pti_finite((double)rgb[i])) {
+            pti_scene_fail_value(scene, item, number, "pixel value", (double)rgb[i], max > 1 ? "is negative or not finite" : "is outside [0,1]");
+            return 0;
+        }
+    return 1;
+}
+#endif
+
+/* The switch that left a material out, NULL if none did. */
+static const char *pti_material_left_out(const pt_material *m)
+{
+    switch (m->kind) {
+    case PT_MATERIAL_CONDUCTOR:
+    case PT_MATERIAL_OREN_NAYAR: return PTI_HAS_MICROFACET ? NULL : "conductors and Oren-Nayar were left out: PT_NO_MICROFACET";
+    case PT_MATERIAL_DIELECTRIC: return PTI_HAS_MICROFACET || pti_is_smooth(m) ? NULL : "rough glass was left out: PT_NO_MICROFACET";
+    case PT_MATERIAL_PHONG:
+    case PT_MATERIAL_BLINN: return PTI_HAS_PHONG ? NULL : "Phong and Blinn-Phong were left out: PT_NO_PHONG";
+    case PT_MATERIAL_COAT: return PTI_HAS_COAT ? NULL : "coats were left out: PT_NO_COAT";
+    case PT_MATERIAL_MEASURED: return PTI_HAS_MEASURED ? NULL : "measured tables were left out: PT_NO_MEASURED";
+    default: return NULL;
+    }
+}
+
+/* What the kinds ask of their own parameters. */
+static int pti_check_kind(pt_scene *scene, uint32_t n, const pt_material *m)
+{
+    pt_rgb sum = pt_rgb_add(m->albedo, m->specular);
+    double most = fmax((double)sum.r, fmax((double)sum.g, (double)sum.b));
+    if (m->kind == PT_MATERIAL_PHONG || m->kind == PT_MATERIAL_BLINN) {
+        if (!pti_check_rgb(scene, "material", n, "specular", m->specular, 1)) return 0;
+        if (most > 1 + 2 * PTI_UNIT_ROUNDOFF) return !pti_scene_fail_value(scene, "material", n, "albedo + specular", most, "is above 1");
+        if (!(m->exponent >= 0 && (double)m->exponent <= 1e6))
+            return !pti_scene_fail_value(scene, "material", n, "exponent", (double)m->exponent, "is outside [0, 1e6]");
+    }
+    if (m->kind == PT_MATERIAL_COAT && !(pti_ior(m) > 1))
+        return !pti_scene_fail_value(scene, "material", n, "ior", (double)m->ior, "of a coat is not above 1");
+    if (m->kind == PT_MATERIAL_CONDUCTOR) {
+        if (!pti_check_rgb(scene, "material", n, "eta", m->eta, HUGE_VAL) || !pti_check_rgb(scene, "material", n, "k", m->k, HUGE_VAL)) return 0;
+        if (!(m->eta.r > 0 && m->eta.g > 0 && m->eta.b > 0)) return !pti_scene_fail(scene, PT_ERROR_SCENE, "material", n, "eta is not positive");
+    }
+#if PTI_HAS_MEASURED
+    if (m->kind == PT_MATERIAL_MEASURED && !(m->measured && m->measured->value))
+        return !pti_scene_fail(scene, PT_ERROR_SCENE, "material", n, "has no measured table");
+#endif
+    return 1;
+}
+
+#if PTI_HAS_TEXTURES
+static int pti_check_texture(pt_scene *scene, uint32_t n, const pt_texture *t)
+{
+    if ((int)t->kind < 0 || t->kind > PT_TEXTURE_FUNCTION)
+        return !pti_scene_fail_value(scene, "material", n, "texture kind", (double)t->kind, "is unknown");
+    if (!pti_finite((double)t->scale.x) || !pti_finite((double)t->scale.y))
+        return !pti_scene_fail(scene, PT_ERROR_SCENE, "material", n, "texture scale is not finite");
+    if (t->kind == PT_TEXTURE_CHECKER)
+        return pti_check_rgb(scene, "material", n, "texture a", t->a, 1) && pti_check_rgb(scene, "material", n, "texture b", t->b, 1);
+    if (t->kind == PT_TEXTURE_FUNCTION) return t->function ? 1 : !pti_scene_fail(scene, PT_ERROR_SCENE, "material", n, "texture has no function");
+    if (!t->rgb || t->width < 1 || t->height < 1 || t->width > 65536 || t->height > 65536)
+        return !pti_scene_fail(scene, PT_ERROR_SCENE, "material", n, "texture image is empty or larger than 65536 x 65536");
+    return pti_check_pixels(scene, "material", n, t->rgb, 3 * (size_t)t->width * (size_t)t->height, 1);
+}
+#endif
+
 PTDEF int pt_add_material(pt_scene *scene, pt_material material)
 {
     uint32_t n = scene->material_count;
-    if ((int)material.kind < 0 || material.kind > PT_MATERIAL_DIELECTRIC)
+    const char *left_out;
+    if ((int)material.kind < 0 || material.kind > PT_MATERIAL_MEASURED)
         return pti_scene_fail_value(scene, "material", n, "kind", (double)material.kind, "is unknown");
     if (!pti_check_rgb(scene, "material", n, "albedo", material.albedo, 1)) return -1;
     if (!pti_check_rgb(scene, "material", n, "emission", material.emission, HUGE_VAL)) return -1;
     if (!(material.ior >= 0) || !pti_finite((double)material.ior))
         return pti_scene_fail_value(scene, "material", n, "ior", (double)material.ior, "is negative or not finite");
+    if (!(material.roughness >= 0 && material.roughness <= 1))
+        return pti_scene_fail_value(scene, "material", n, "roughness", (double)material.roughness, "is outside [0,1]");
+    left_out = pti_material_left_out(&material);
+    if (left_out) return pti_scene_fail(scene, PT_ERROR_LEFT_OUT, "material", n, left_out);
+    if (!pti_check_kind(scene, n, &material)) return -1;
+#if PTI_HAS_TEXTURES
+    if (material.texture && !pti_check_texture(scene, n, material.texture)) return -1;
+#endif
     if (material.medium_inside != 0 || material.medium_outside != 0)
         return pti_scene_fail(scene, PT_ERROR_LEFT_OUT, "material", n, "media need a volumetric method");
     return PTI_PUSH(scene, "material", materials, material_count, material_capacity, material);
@@ -4641,20 +6028,121 @@ PTDEF int pt_add_sphere(pt_scene *scene, pt_vec3 centre, pt_real radius, int mat
     return PTI_PUSH(scene, "sphere", spheres, sphere_count, sphere_capacity, s);
 }
 
+static int pti_add_delta_light(pt_scene *scene, const char *item, const pt_delta_light *l)
+{
+    uint32_t n = scene->delta_light_count;
+    if (!pti_check_coordinates(scene, item, n, &l->position, 1) || !pti_check_coordinates(scene, item, n, &l->direction, 1)) return -1;
+    if (!pti_check_rgb(scene, item, n, "intensity", l->intensity, HUGE_VAL)) return -1;
+    if (l->kind != PT_LIGHT_POINT && !(pt_v3_dot(l->direction, l->direction) > PTI_R(0.5)))
+        return pti_scene_fail(scene, PT_ERROR_SCENE, item, n, "its direction is zero");
+    if (l->kind == PT_LIGHT_SPOT && !(l->cos_end < l->cos_start))
+        return pti_scene_fail(scene, PT_ERROR_SCENE, item, n, "its angles are not 0 <= start < end <= 180 degrees");
+    return PTI_PUSH(scene, item, delta_lights, delta_light_count, delta_light_capacity, *l);
+}
+
+static pt_delta_light pti_delta_light(pt_light_kind kind, pt_vec3 position, pt_vec3 direction, pt_rgb intensity)
+{
+    pt_delta_light l;
+    memset(&l, 0, sizeof l);
+    l.kind = kind;
+    l.position = position;
+    l.direction = pt_v3_normalize(direction);
+    l.intensity = intensity;
+    return l;
+}
+
 PTDEF int pt_add_point_light(pt_scene *scene, pt_vec3 position, pt_rgb intensity)
 {
-    uint32_t n = scene->point_light_count;
-    const pt_point_light l = {position, intensity};
-    if (!pti_check_coordinates(scene, "point light", n, &position, 1)) return -1;
-    if (!pti_check_rgb(scene, "point light", n, "intensity", intensity, HUGE_VAL)) return -1;
-    return PTI_PUSH(scene, "point light", point_lights, point_light_count, point_light_capacity, l);
+    pt_delta_light l = pti_delta_light(PT_LIGHT_POINT, position, pt_v3(0, 0, 0), intensity);
+    return pti_add_delta_light(scene, "point light", &l);
+}
+
+PTDEF int pt_add_spot_light(pt_scene *scene, pt_vec3 position, pt_vec3 direction, pt_rgb intensity, double start_deg,
+                            double end_deg)
+{
+    pt_delta_light l = pti_delta_light(PT_LIGHT_SPOT, position, direction, intensity);
+    int ok = start_deg >= 0 && start_deg < end_deg && end_deg <= 180;
+    l.cos_start = ok ? cos(start_deg * (PT_PI / 180)) : 0;
+    l.cos_end = ok ? cos(end_deg * (PT_PI / 180)) : 1; /* refused below */
+    return pti_add_delta_light(scene, "spot light", &l);
+}
+
+PTDEF int pt_add_directional_light(pt_scene *scene, pt_vec3 direction, pt_rgb irradiance)
+{
+    pt_delta_light l = pti_delta_light(PT_LIGHT_DIRECTIONAL, pt_v3(0, 0, 0), direction, irradiance);
+    return pti_add_delta_light(scene, "directional light", &l);
 }
 
 #if PTI_HAS_ENVIRONMENT
+static void pti_map_free(pt_scene *scene)
+{
+    pti_free(scene->map.rgb, scene->alloc_user);
+    pti_free(scene->map.rows, scene->alloc_user);
+    pti_free(scene->map.columns, scene->alloc_user);
+    memset(&scene->map, 0, sizeof scene->map);
+}
+
 PTDEF int pt_set_environment(pt_scene *scene, pt_rgb radiance)
 {
     if (!pti_check_rgb(scene, "environment", 0, "radiance", radiance, HUGE_VAL)) return -1;
+    pti_map_free(scene);
     scene->environment = radiance;
+    scene->committed = 0;
+    return 0;
+}
+
+/* Turns the weights w[1..count] into a cumulative list from 0 to 1, evenly where all are 0; their sum. */
+static double pti_accumulate(double *w, int count)
+{
+    double sum = 0;
+    int i;
+    w[0] = 0;
+    for (i = 1; i <= count; i++) w[i] = sum += w[i];
+    for (i = 1; i <= count; i++) w[i] = sum > 0 ? w[i] / sum : (double)i / count;
+    w[count] = 1;
+    return sum;
+}
+
+/* The distribution of a map's light, and its mean radiance over the sphere. */
+static pt_rgb pti_map_finish(pt_environment_map *m)
+{
+    pt_rgbd mean = pt_rgbd3(0, 0, 0);
+    int x, y;
+    for (y = 0; y < m->height; y++) {
+        double *columns = m->columns + (size_t)y * ((size_t)m->width + 1), w = pti_map_solid_angle(m, y);
+        for (x = 0; x < m->width; x++) {
+            pt_rgb c = pti_map_value(m, x, y);
+            columns[x + 1] = pt_luminance((double)c.r, (double)c.g, (double)c.b);
+            mean = pt_rgbd3(mean.r + w * (double)c.r, mean.g + w * (double)c.g, mean.b + w * (double)c.b);
+        }
+        m->rows[y + 1] = pti_accumulate(columns, m->width) * w;
+    }
+    pti_accumulate(m->rows, m->height);
+    return pt_rgb3((pt_real)(mean.r / (4 * PT_PI)), (pt_real)(mean.g / (4 * PT_PI)), (pt_real)(mean.b / (4 * PT_PI)));
+}
+
+PTDEF int pt_set_environment_image(pt_scene *scene, const float *rgb, int width, int height, double scale)
+{
+    pt_environment_map m;
+    size_t pixels = (size_t)(width > 0 ? width : 0) * (size_t)(height > 0 ? height : 0);
+    if (!rgb || width < 1 || height < 1 || width > 65536 || height > 65536)
+        return pti_scene_fail(scene, PT_ERROR_ARGUMENT, "environment", 0, "the image is empty or larger than 65536 x 65536");
+    if (!(scale >= 0) || !pti_finite(scale)) return pti_scene_fail_value(scene, "environment", 0, "scale", scale, "is negative or not finite");
+    if (!pti_check_pixels(scene, "environment", 0, rgb, 3 * pixels, HUGE_VAL)) return -1;
+    pti_map_free(scene);
+    m.width = width;
+    m.height = height;
+    m.scale = scale;
+    m.rgb = (float *)pti_alloc(3 * pixels, sizeof *m.rgb, scene->alloc_user);
+    m.rows = (double *)pti_alloc((size_t)height + 1, sizeof *m.rows, scene->alloc_user);
+    m.columns = (double *)pti_alloc((size_t)height * ((size_t)width + 1), sizeof *m.columns, scene->alloc_user);
+    scene->map = m;
+    if (!m.rgb || !m.rows || !m.columns) {
+        pti_map_free(scene);
+        return pti_scene_no_memory(scene, "environment", 0);
+    }
+    memcpy(m.rgb, rgb, 3 * pixels * sizeof *rgb);
+    scene->environment = pti_map_finish(&scene->map);
     scene->committed = 0;
     return 0;
 }
@@ -4731,14 +6219,16 @@ static int pti_commit_tree(pt_scene *scene)
     return ok;
 }
 
-/* Power of a light for its share of the samples: pi A L seen from one side, 4 pi I, pi L times the area of the
-   sphere around the scene. */
+/* Power of a light for its share of the samples: pi A L seen from one side, 4 pi I, that of a spot; from infinity
+   what enters the sphere around the scene: E times its cross-section, pi L times its area. */
 static double pti_light_power(const pt_scene *scene, const pt_light *l)
 {
     double r = pti_scene_radius(scene);
     double mean = ((double)l->emission.r + (double)l->emission.g + (double)l->emission.b) / 3;
     if (l->kind == PT_LIGHT_AREA) return PT_PI * l->area * mean;
-    if (l->kind == PT_LIGHT_POINT) return 4 * PT_PI * mean;
+    if (l->kind == PT_LIGHT_POINT) return pt_flux_point(mean);
+    if (l->kind == PT_LIGHT_SPOT) return pt_flux_spot(mean, l->cos_start, l->cos_end);
+    if (l->kind == PT_LIGHT_DIRECTIONAL) return PT_PI * r * r * mean;
     return PT_PI * mean * 4 * PT_PI * r * r;
 }
 
@@ -4757,12 +6247,15 @@ static void pti_collect_lights(pt_scene *scene)
         p->light = (int)scene->light_count;
         scene->lights[scene->light_count++] = l;
     }
-    for (i = 0; i < scene->point_light_count; i++) {
+    for (i = 0; i < scene->delta_light_count; i++) {
         memset(&l, 0, sizeof l);
-        l.kind = PT_LIGHT_POINT;
+        l.kind = scene->delta_lights[i].kind;
         l.primitive = -1;
-        l.position = scene->point_lights[i].position;
-        l.emission = scene->point_lights[i].intensity;
+        l.position = scene->delta_lights[i].position;
+        l.direction = scene->delta_lights[i].direction;
+        l.cos_start = scene->delta_lights[i].cos_start;
+        l.cos_end = scene->delta_lights[i].cos_end;
+        l.emission = scene->delta_lights[i].intensity;
         if (!pti_rgb_black(l.emission)) scene->lights[scene->light_count++] = l;
     }
     if (PTI_HAS_ENVIRONMENT && !pti_rgb_black(scene->environment)) {
@@ -4777,7 +6270,7 @@ static void pti_collect_lights(pt_scene *scene)
 
 static int pti_commit_lights(pt_scene *scene)
 {
-    size_t most = (size_t)scene->primitive_count + scene->point_light_count + 1;
+    size_t most = (size_t)scene->primitive_count + scene->delta_light_count + 1;
     double *power;
     uint32_t i;
     int ok;
@@ -4796,21 +6289,26 @@ static int pti_commit_lights(pt_scene *scene)
 
 static unsigned pti_find_needs(const pt_scene *scene)
 {
-    static const unsigned shapes[3] = {PT_NEEDS_TRIANGLES, PT_NEEDS_PARALLELOGRAMS, PT_NEEDS_SPHERES};
-    static const unsigned kinds[3] = {PT_NEEDS_DIFFUSE, PT_NEEDS_MIRROR, PT_NEEDS_DIELECTRIC};
-    static const unsigned lights[3] = {PT_NEEDS_AREA_LIGHTS, PT_NEEDS_POINT_LIGHTS, PT_NEEDS_ENVIRONMENT};
     unsigned needs = 0;
     uint32_t i;
     for (i = 0; i < scene->primitive_count; i++) {
         const pt_primitive *p = &scene->primitives[i];
-        needs |= shapes[p->shape] | kinds[scene->materials[pti_primitive_material(scene, p)].kind];
+        const pt_material *m = &scene->materials[pti_primitive_material(scene, p)];
+        needs |= (unsigned)PT_NEEDS_TRIANGLES << p->shape | (unsigned)PT_NEEDS_DIFFUSE << m->kind;
+        if ((m->kind == PT_MATERIAL_DIELECTRIC || m->kind == PT_MATERIAL_CONDUCTOR) && !pti_is_smooth(m)) needs |= PT_NEEDS_ROUGHNESS;
+#if PTI_HAS_TEXTURES
+        if (m->texture) needs |= PT_NEEDS_TEXTURES;
+#endif
         if (p->shape == PT_SHAPE_TRIANGLE) {
             const pt_mesh *mesh = &scene->meshes[scene->triangles[p->index].mesh];
             if (mesh->has_normals) needs |= PT_NEEDS_SHADING_NORMALS;
             if (mesh->has_uvs) needs |= PT_NEEDS_UVS;
         }
     }
-    for (i = 0; i < scene->light_count; i++) needs |= lights[scene->lights[i].kind];
+    for (i = 0; i < scene->light_count; i++) needs |= (unsigned)PT_NEEDS_AREA_LIGHTS << scene->lights[i].kind;
+#if PTI_HAS_ENVIRONMENT
+    if (scene->environment_light >= 0 && scene->map.rgb) needs |= PT_NEEDS_ENVIRONMENT_IMAGE;
+#endif
 #if PTI_HAS_BVH
     if (scene->bvh.node_count > 0) needs |= PT_NEEDS_BVH;
 #endif
@@ -4862,12 +6360,13 @@ PTDEF unsigned pt_scene_needs(const pt_scene *scene)
 
 PTDEF const char *pt_scene_needs_string(const pt_scene *scene, char *buffer, size_t size)
 {
-    static const char *const names[12] = {"triangles", "parallelograms", "spheres", "shading normals",
-        "texture coordinates", "diffuse", "mirror", "dielectric", "area lights", "point lights", "environment", "tree"};
+    static const char *const names[23] = {"triangles", "parallelograms", "spheres", "shading normals", "texture coordinates",
+        "diffuse", "mirror", "dielectric", "conductor", "oren-nayar", "phong", "blinn-phong", "coat", "measured", "roughness",
+        "textures", "area lights", "point lights", "spot lights", "directional lights", "environment", "environment image", "tree"};
     int i;
     if (size == 0) return "";
     buffer[0] = 0;
-    for (i = 0; i < 12; i++)
+    for (i = 0; i < 23; i++)
         if (scene->needs & (1u << i)) {
             if (buffer[0]) pti_append(buffer, size, ", ");
             pti_append(buffer, size, names[i]);
@@ -4887,7 +6386,10 @@ PTDEF void pt_scene_free(pt_scene *scene)
     pti_free(scene->meshes, user);
     pti_free(scene->spheres, user);
     pti_free(scene->parallelograms, user);
-    pti_free(scene->point_lights, user);
+    pti_free(scene->delta_lights, user);
+#if PTI_HAS_ENVIRONMENT
+    pti_map_free(scene);
+#endif
     memset(scene, 0, sizeof *scene);
     scene->alloc_user = user;
 }
@@ -4929,6 +6431,11 @@ PTDEF pt_camera pt_camera_look_at(pt_vec3 eye, pt_vec3 target, pt_vec3 up, pt_re
     c.tan_half = (pt_real)tan((double)vfov_deg * (PT_PI / 360));
     c.focus_distance = 1;
     return c;
+}
+
+PTDEF double pt_vfov_deg_of_film(double film_height, double focal_length)
+{
+    return 2 * atan(0.5 * film_height / focal_length) * 180 / PT_PI;
 }
 
 PTI_INLINE pt_real pti_focus(const pt_camera *c)
@@ -5002,6 +6509,28 @@ PTDEF void pt_camera_pdf(const pt_camera *c, pt_real aspect, pt_vec3 direction, 
     *pdf_w = cos_lens > 0 ? 1 / (pti_image_area(c, aspect) * cos_lens * cos_lens * cos_lens) : 0;
 }
 
+static double pti_tent(double u)
+{
+    return u < 0.5 ? sqrt(2 * u) - 1 : 1 - sqrt(2 * (1 - u));
+}
+
+PTDEF pt_vec2 pt_filter_sample(pt_filter filter, double radius, pt_vec2 u)
+{
+    double r, phi, x = (double)u.x, y = (double)u.y;
+    if (filter == PT_FILTER_GAUSSIAN) { /* -2 ln of a uniform number is the square of a radius [PBR] A.4.4 */
+        radius = radius > 0 ? radius : 1.5;
+        r = radius / 3 * sqrt(-2 * log(1 + x * expm1(-4.5)));
+        phi = 2 * PT_PI * y;
+        return pt_v2((pt_real)(r * cos(phi)), (pt_real)(r * sin(phi)));
+    }
+    if (filter == PT_FILTER_TENT) {
+        radius = radius > 0 ? radius : 1;
+        return pt_v2((pt_real)(radius * pti_tent(x)), (pt_real)(radius * pti_tent(y)));
+    }
+    radius = radius > 0 ? radius : 0.5;
+    return pt_v2((pt_real)(radius * (2 * x - 1)), (pt_real)(radius * (2 * y - 1)));
+}
+
 /* --- film --- */
 
 PTDEF void pt_film_free(pt_film *film)
@@ -5015,6 +6544,7 @@ PTDEF void pt_film_free(pt_film *film)
     pti_free(film->albedo, user);
     pti_free(film->normal, user);
     pti_free(film->depth, user);
+    pti_free(film->classes, user);
     pti_free(film->ranges, user);
     memset(film, 0, sizeof *film);
     film->alloc_user = user;
@@ -5040,6 +6570,29 @@ PTDEF pt_result pt_film_make(pt_film *film, int width, int height, int aov)
     }
     film->width = width;
     film->height = height;
+    return PT_OK;
+}
+
+PTDEF pt_result pt_film_make_classes(pt_film *film, int class_count)
+{
+    size_t n = 3 * (size_t)film->width * (size_t)film->height;
+    if (class_count < 1 || !film->half[0]) return PT_ERROR_ARGUMENT;
+    if (n > SIZE_MAX / sizeof(double) / (size_t)class_count) return PT_ERROR_MEMORY;
+    pti_free(film->classes, film->alloc_user);
+    film->classes = (double *)pti_alloc_zero(n * (size_t)class_count, sizeof(double), film->alloc_user);
+    film->class_count = film->classes ? class_count : 0;
+    return film->classes ? PT_OK : PT_ERROR_MEMORY;
+}
+
+PTDEF pt_result pt_film_class(const pt_film *film, int index, pt_film *out)
+{
+    size_t n = 3 * (size_t)film->width * (size_t)film->height;
+    pt_result result;
+    if (index < 0 || index >= film->class_count) return PT_ERROR_ARGUMENT;
+    result = pt_film_make(out, film->width, film->height, 0);
+    if (result != PT_OK) return result;
+    memcpy(out->half[0], film->classes + n * (size_t)index, n * sizeof(double));
+    out->samples[0] = film->samples[0] + film->samples[1];
     return PT_OK;
 }
 
@@ -5117,7 +6670,7 @@ PTDEF pt_result pt_film_merge(pt_film *a, const pt_film *b)
     uint32_t i;
     int h;
     if (a->width != b->width || a->height != b->height || a->fingerprint != b->fingerprint) return PT_ERROR_MISMATCH;
-    if ((a->albedo != NULL) != (b->albedo != NULL)) return PT_ERROR_MISMATCH;
+    if ((a->albedo != NULL) != (b->albedo != NULL) || a->class_count != b->class_count) return PT_ERROR_MISMATCH;
     ranges.alloc_user = a->alloc_user;
     for (i = 0; i < a->range_count && result == PT_OK; i++) result = pt_film_add_range(&ranges, a->ranges[i].begin, a->ranges[i].end);
     for (i = 0; i < b->range_count && result == PT_OK; i++) result = pt_film_add_range(&ranges, b->ranges[i].begin, b->ranges[i].end);
@@ -5139,6 +6692,7 @@ PTDEF pt_result pt_film_merge(pt_film *a, const pt_film *b)
     pti_add_array(a->albedo, b->albedo, 3 * n);
     pti_add_array(a->normal, b->normal, 3 * n);
     pti_add_array(a->depth, b->depth, n);
+    pti_add_array(a->classes, b->classes, 3 * n * (size_t)a->class_count);
     a->nonfinite += b->nonfinite;
     return PT_OK;
 }
@@ -5254,14 +6808,273 @@ PTDEF void pt_film_error(const pt_film *film, const float *reference, pt_error *
    The body is written once, with the features a scene may need as a constant mask: pti_path below is compiled
    for each mask that the driver picks from. */
 
-enum { PTI_TECHNIQUE_PLAIN, PTI_TECHNIQUE_LIGHT, PTI_TECHNIQUE_MIS };
+enum { PTI_TECHNIQUE_PLAIN, PTI_TECHNIQUE_LIGHT, PTI_TECHNIQUE_MIS, PTI_TECHNIQUE_DISTRIBUTION };
+
+#if PTI_HAS_LPE || PTI_HAS_WHITTED
+/* The share of lobe `lobe` in the whole BSDF at a direction, per band; 0 where the whole is 0. */
+static pt_rgbd pti_lobe_share(const pt_bsdf *bsdf, pt_vec3 wo, pt_vec3 wi, unsigned lobe)
+{
+    pt_rgb f = pt_bsdf_eval(bsdf, wo, wi, PT_RADIANCE, lobe), all = pt_bsdf_eval(bsdf, wo, wi, PT_RADIANCE, PT_LOBE_ALL);
+    return pt_rgbd3(all.r > 0 ? (double)f.r / (double)all.r : 0, all.g > 0 ? (double)f.g / (double)all.g : 0,
+                    all.b > 0 ? (double)f.b / (double)all.b : 0);
+}
+#endif
+
+#if PTI_HAS_LPE
+/* --- light-path expressions --- Each letter of an expression is a position. Which positions may begin a word,
+   end it, and follow each other is found while parsing (Glushkov's automaton); read backwards, from the eye, a
+   state is a set of positions, one 64-bit set for each expression, and all states that can occur are numbered. */
+
+/* A part of an expression: may it be empty, where it may begin and end. */
+typedef struct pti_regex {
+    uint64_t first, last;
+    int nullable;
+} pti_regex;
+
+typedef struct pti_parser {
+    const char *at;
+    const char *error;
+    int depth, count;
+    uint64_t letters[6];     /* positions of L D G S V E                                                   */
+    uint64_t before[64];     /* positions that may stand just before this one                              */
+    pti_regex (*parse)(struct pti_parser *p); /* a whole expression: what stands in parentheses            */
+} pti_parser;
+
+static const char pti_alphabet[] = "LDGSVE";
+
+/* A position that takes each of the letters in the set. */
+static pti_regex pti_position(pti_parser *p, unsigned set)
+{
+    pti_regex r = {0, 0, 0};
+    int k;
+    if (p->count == 64) p->error = "an expression has more than 64 letters";
+    if (p->error) return r;
+    for (k = 0; k < 6; k++)
+        if (set & (1u << k)) p->letters[k] |= UINT64_C(1) << p->count;
+    r.first = r.last = UINT64_C(1) << p->count++;
+    return r;
+}
+
+static unsigned pti_letter_bit(char c)
+{
+    const char *at = c ? strchr(pti_alphabet, c) : NULL;
+    return at ? 1u << (at - pti_alphabet) : 0;
+}
+
+static pti_regex pti_parse_atom(pti_parser *p)
+{
+    unsigned set = 0;
+    pti_regex r = {0, 0, 0};
+    char c = *p->at;
+    if (c) p->at++;
+    if (c == '(') {
+        if (++p->depth > 32) p->error = "parentheses are nested too deeply";
+        if (!p->error) r = p->parse(p);
+        p->depth--;
+        if (*p->at == ')') p->at++;
+        else if (!p->error) p->error = "a parenthesis is not closed";
+        return r;
+    }
+    if (c == '[') {
+        for (; pti_letter_bit(*p->at); p->at++) set |= pti_letter_bit(*p->at);
+        if (*p->at == ']' && set) p->at++;
+        else p->error = "a set of letters is empty or not closed";
+        return pti_position(p, set);
+    }
+    set = c == '.' ? 0x1eu : pti_letter_bit(c);
+    if (!set) p->error = "a letter other than L D G S V E stands in an expression";
+    return pti_position(p, set);
+}
+
+/* The positions in `after` may follow those in `before`. */
+static void pti_follow(pti_parser *p, uint64_t before, uint64_t after)
+{
+    int k;
+    for (k = 0; k < p->count; k++)
+        if (after >> k & 1) p->before[k] |= before;
+}
+
+static pti_regex pti_parse_sequence(pti_parser *p)
+{
+    pti_regex all = {0, 0, 1};
+    while (!p->error && *p->at && *p->at != ')' && *p->at != '|') {
+        pti_regex r = pti_parse_atom(p);
+        for (; !p->error && (*p->at == '*' || *p->at == '+' || *p->at == '?'); p->at++) {
+            if (*p->at != '?') pti_follow(p, r.last, r.first);
+            if (*p->at != '+') r.nullable = 1;
+        }
+        pti_follow(p, all.last, r.first);
+        if (all.nullable) all.first |= r.first;
+        all.last = r.nullable ? all.last | r.last : r.last;
+        all.nullable &= r.nullable;
+    }
+    return all;
+}
+
+static pti_regex pti_parse_or(pti_parser *p)
+{
+    pti_regex all = pti_parse_sequence(p);
+    while (!p->error && *p->at == '|') {
+        pti_regex r;
+        p->at++;
+        r = pti_parse_sequence(p);
+        all.first |= r.first;
+        all.last |= r.last;
+        all.nullable |= r.nullable;
+    }
+    return all;
+}
+
+/* The automaton of a list while it is being made. */
+typedef struct pti_lpe_maker {
+    pti_parser parser[PT_LPE_EXPRESSIONS];
+    pti_regex whole[PT_LPE_EXPRESSIONS];
+    uint64_t states[PT_LPE_STATES][PT_LPE_EXPRESSIONS];
+    int count;
+} pti_lpe_maker;
+
+/* The positions that may stand just before those of the set, if their letter is that one. */
+static uint64_t pti_step_back(const pti_parser *p, uint64_t set, int letter)
+{
+    uint64_t result = 0;
+    int k;
+    for (k = 0; k < p->count; k++)
+        if (set >> k & 1) result |= p->before[k];
+    return result & p->letters[letter];
+}
+
+/* The number of a state, a new one if it has not occurred; -1: too many. */
+static int pti_lpe_state(pti_lpe_maker *m, pt_lpe *lpe, const uint64_t *set)
+{
+    int n;
+    for (n = 0; n < lpe->state_count; n++)
+        if (memcmp(m->states[n], set, sizeof m->states[n]) == 0) return n;
+    if (n == PT_LPE_STATES) return -1;
+    memcpy(m->states[n], set, sizeof m->states[n]);
+    lpe->state_count++;
+    return n;
+}
+
+/* Finds all states from the eye on; 0: too many. */
+static int pti_lpe_states(pti_lpe_maker *m, pt_lpe *lpe)
+{
+    uint64_t set[PT_LPE_EXPRESSIONS] = {0};
+    int s, k, c, n;
+    for (k = 0; k < m->count; k++) set[k] = m->whole[k].last & m->parser[k].letters[5];
+    lpe->state_count = 0;
+    pti_lpe_state(m, lpe, set);
+    for (s = 0; s < lpe->state_count; s++) {
+        lpe->class_of[s] = (unsigned char)m->count;
+        for (k = m->count - 1; k >= 0; k--)
+            if (pti_step_back(&m->parser[k], m->states[s][k], 0) & m->whole[k].first) lpe->class_of[s] = (unsigned char)k;
+        for (c = 1; c < 5; c++) {
+            for (k = 0; k < m->count; k++) set[k] = pti_step_back(&m->parser[k], m->states[s][k], c);
+            n = pti_lpe_state(m, lpe, set);
+            if (n < 0) return 0;
+            lpe->next[s][c - 1] = (unsigned char)n;
+        }
+    }
+    return 1;
+}
+
+PTDEF pt_result pt_lpe_compile(pt_lpe *lpe, const char *const *expressions, int count, const char **error)
+{
+    pti_lpe_maker m;
+    const char *why = NULL;
+    int k;
+    memset(lpe, 0, sizeof *lpe);
+    memset(&m, 0, sizeof m);
+    if (count < 0 || count > PT_LPE_EXPRESSIONS || (count > 0 && !expressions)) why = "a list has 0 to 16 expressions";
+    for (k = 0; k < count && !why; k++) {
+        pti_parser *p = &m.parser[k];
+        p->at = expressions[k] ? expressions[k] : "";
+        p->parse = pti_parse_or;
+        m.whole[k] = pti_parse_or(p);
+        why = p->error ? p->error : *p->at ? "a parenthesis was not opened" : m.whole[k].nullable ? "an expression is empty" : NULL;
+    }
+    m.count = count;
+    if (!why && !pti_lpe_states(&m, lpe)) why = "the expressions need more than 64 states";
+    if (error) *error = why;
+    if (why) memset(lpe, 0, sizeof *lpe);
+    else lpe->class_count = count + 1;
+    return why ? PT_ERROR_ARGUMENT : PT_OK;
+}
+
+PTDEF int pt_lpe_class(const pt_lpe *lpe, const char *word)
+{
+    size_t n = strlen(word), i;
+    unsigned s = 0;
+    if (n < 2 || word[0] != 'L' || word[n - 1] != 'E' || lpe->class_count == 0) return -1;
+    for (i = n - 2; i > 0; i--) {
+        const char *at = strchr("DGSV", word[i]);
+        if (!at || !word[i]) return -1;
+        s = lpe->next[s][at - "DGSV"];
+    }
+    return lpe->class_of[s];
+}
+
+PTDEF const char *const *pt_lpe_slides(void)
+{
+    static const char *const rows[PT_LPE_SLIDES_COUNT] = {"LE", "L[DGS]E", "L[SDG]S+E", "LS+[DG]E", "L[SDG]*[DG][DG]E",
+                                                          "L[SDG]+[DG]S+E", "L[SDG]+[DG][SDG]*E", "L.*V.*E"};
+    return rows;
+}
+
+static int pti_letter_index(unsigned lobe)
+{
+    return lobe == PT_LOBE_DIFFUSE ? 0 : lobe == PT_LOBE_GLOSSY ? 1 : 2;
+}
+
+/* The whole of beta begins in state 0. */
+static void pti_share_start(const pt_lpe *lpe, pt_rgbd *share)
+{
+    memset(share, 0, (size_t)lpe->state_count * sizeof *share);
+    share[0] = pt_rgbd3(1, 1, 1);
+}
+
+/* Adds a contribution to the classes, divided as the path so far is; lobe: one more letter before L, or 0. */
+static void pti_classify(const pt_lpe *lpe, const pt_rgbd *share, pt_rgbd *classes, unsigned lobe, pt_rgbd c)
+{
+    int s;
+    for (s = 0; s < lpe->state_count; s++) {
+        pt_rgbd *sum = &classes[lpe->class_of[lobe ? lpe->next[s][pti_letter_index(lobe)] : s]];
+        sum->r += c.r * share[s].r;
+        sum->g += c.g * share[s].g;
+        sum->b += c.b * share[s].b;
+    }
+}
+
+/* Moves what is in each state by the letters of a scattering, in proportion to their parts of the BSDF at the
+   direction drawn: the classes get their exact integrals, whichever lobe drew it. */
+static void pti_advance(const pt_lpe *lpe, pt_rgbd *share, const pt_bsdf *bsdf, pt_vec3 wo, const pt_bsdf_sample_result *sample, int without_diffuse)
+{
+    pt_rgbd next[PT_LPE_STATES];
+    pt_rgbd d = pt_rgbd3(0, 0, 0);
+    int s, mixed = sample->lobe != PT_LOBE_SPECULAR && (bsdf->lobes & PT_LOBE_DIFFUSE) && (bsdf->lobes & PT_LOBE_GLOSSY);
+    if (mixed && !without_diffuse) d = pti_lobe_share(bsdf, wo, sample->wi, PT_LOBE_DIFFUSE);
+    memset(next, 0, (size_t)lpe->state_count * sizeof *next);
+    for (s = 0; s < lpe->state_count; s++) {
+        pt_rgbd *to = &next[lpe->next[s][mixed ? 1 : pti_letter_index(sample->lobe)]], *diffuse = &next[lpe->next[s][0]];
+        to->r += share[s].r * (1 - d.r);
+        to->g += share[s].g * (1 - d.g);
+        to->b += share[s].b * (1 - d.b);
+        diffuse->r += share[s].r * d.r;
+        diffuse->g += share[s].g * d.g;
+        diffuse->b += share[s].b * d.b;
+    }
+    memcpy(share, next, (size_t)lpe->state_count * sizeof *next);
+}
+#endif
+
 
 /* Features that an instance of the integrator may leave out. */
 enum {
     PTI_WITH_SPECULAR = 1,
     PTI_WITH_ENVIRONMENT = 2,
     PTI_WITH_OBSERVER = 4,
-    PTI_WITH_ALL = PTI_WITH_SPECULAR | (PTI_HAS_ENVIRONMENT ? PTI_WITH_ENVIRONMENT : 0) | (PTI_HAS_OBSERVER ? PTI_WITH_OBSERVER : 0)
+    PTI_WITH_LPE = 8,
+    PTI_WITH_ALL = PTI_WITH_SPECULAR | (PTI_HAS_ENVIRONMENT ? PTI_WITH_ENVIRONMENT : 0) |
+                   (PTI_HAS_OBSERVER ? PTI_WITH_OBSERVER : 0) | (PTI_HAS_LPE ? PTI_WITH_LPE : 0)
 };
 
 /* A walk under way. */
@@ -5281,7 +7094,26 @@ typedef struct pti_walk {
 #if PTI_HAS_OBSERVER
     char letters[PT_WORD_MAX];
 #endif
+#if PTI_HAS_LPE
+    const pt_lpe *lpe;      /* NULL = no classes wanted                                                    */
+    pt_rgbd *classes;       /* where they are added                                                        */
+    pt_rgbd share[PT_LPE_STATES]; /* how much of beta is in which state of the automaton                   */
+#endif
 } pti_walk;
+
+/* Are contributions to be told lobe by lobe? */
+PTI_INLINE int pti_is_watched(const pti_walk *w, const unsigned features)
+{
+#if PTI_HAS_OBSERVER
+    if ((features & PTI_WITH_OBSERVER) && w->options->observer) return 1;
+#endif
+#if PTI_HAS_LPE
+    if ((features & PTI_WITH_LPE) && w->lpe) return 1;
+#endif
+    (void)w;
+    (void)features;
+    return 0;
+}
 
 #if PTI_HAS_OBSERVER
 static char pti_letter(unsigned lobe)
@@ -5307,8 +7139,8 @@ static void pti_observe(const pti_walk *w, int edges, pt_rgbd value)
 }
 #endif
 
-/* Adds beta * value * weight. */
-PTI_INLINE void pti_contribute(pti_walk *w, pt_rgb value, double weight, int edges, const unsigned features)
+/* Adds beta * value * weight; lobe: of the surface that a light was sampled from, 0 if the walk hit it. */
+PTI_INLINE void pti_contribute(pti_walk *w, pt_rgb value, double weight, int edges, unsigned lobe, const unsigned features)
 {
     pt_rgbd c = pt_rgbd3(w->beta.r * (double)value.r * weight, w->beta.g * (double)value.g * weight,
                          w->beta.b * (double)value.b * weight);
@@ -5318,7 +7150,11 @@ PTI_INLINE void pti_contribute(pti_walk *w, pt_rgb value, double weight, int edg
 #if PTI_HAS_OBSERVER
     if ((features & PTI_WITH_OBSERVER) && w->options->observer) pti_observe(w, edges, c);
 #endif
+#if PTI_HAS_LPE
+    if ((features & PTI_WITH_LPE) && w->lpe) pti_classify(w->lpe, w->share, w->classes, lobe, c);
+#endif
     (void)edges;
+    (void)lobe;
     (void)features;
 }
 
@@ -5328,7 +7164,7 @@ PTI_INLINE double pti_emission_weight(const pti_walk *w, int light, const pt_hit
     double p;
     if (technique == PTI_TECHNIQUE_PLAIN || w->specular) return 1;
     if (technique == PTI_TECHNIQUE_LIGHT) return 0;
-    p = w->scene->lights[light].pmf * pt_light_pdf_w(w->scene, light, w->ray.o, hit);
+    p = w->scene->lights[light].pmf * pt_light_pdf_w(w->scene, light, w->ray.o, w->ray.d, hit);
     return pt_mis_weight((double)w->pdf_w, p, w->options->heuristic);
 }
 
@@ -5341,7 +7177,7 @@ PTI_INLINE void pti_direct(pti_walk *w, const pt_bsdf *bsdf, pt_vec3 wo, const u
     pt_vec2 u;
     pt_rgb f;
     pt_ray shadow;
-    double pmf, p, weight;
+    double pmf, p, weight, diffuse_weight;
     int light;
     if ((features & PTI_WITH_SPECULAR) && !(bsdf->lobes & (PT_LOBE_DIFFUSE | PT_LOBE_GLOSSY))) return;
     pt_sampler_seek(w->sampler, dimension + PT_DIM_LIGHT_CHOICE);
@@ -5352,33 +7188,49 @@ PTI_INLINE void pti_direct(pti_walk *w, const pt_bsdf *bsdf, pt_vec3 wo, const u
     if (!pt_light_sample(w->scene, light, pti_offset(w->hit.p, w->hit.p_error, w->hit.ng, wo), u, &ls)) return;
     f = pt_bsdf_eval(bsdf, wo, ls.wi, PT_RADIANCE, PT_LOBE_ALL);
     if (pti_rgb_black(f)) return;
-    if ((features & PTI_WITH_ENVIRONMENT) && light == w->scene->environment_light)
+    if ((features & PTI_WITH_SPECULAR) && ls.infinite)
         shadow = pt_spawn_ray(w->hit.p, w->hit.p_error, w->hit.ng, ls.wi);
     else shadow = pt_spawn_ray_to(w->hit.p, w->hit.p_error, w->hit.ng, ls.p, ls.p_error, ls.n);
     w->rays++;
     if (pt_occluded(w->scene, &shadow)) return;
     c = pti_fabs(pt_v3_dot(ls.wi, bsdf->frame.n));
     p = pmf * ls.pdf_w;
-    weight = technique == PTI_TECHNIQUE_MIS && !ls.delta
+    weight = technique >= PTI_TECHNIQUE_MIS && !ls.delta
                  ? pt_mis_weight(p, (double)pt_bsdf_pdf_w(bsdf, wo, ls.wi, PT_RADIANCE), w->options->heuristic) : 1.0;
     weight *= (double)c / p;
-#if PTI_HAS_OBSERVER
-    if ((features & PTI_WITH_OBSERVER) && w->options->observer) { /* one contribution for each lobe */
+    diffuse_weight = technique == PTI_TECHNIQUE_DISTRIBUTION ? (double)c / p : weight; /* see pti_drop_diffuse */
+#if PTI_HAS_OBSERVER || PTI_HAS_LPE || PTI_HAS_WHITTED
+    if (technique == PTI_TECHNIQUE_DISTRIBUTION || pti_is_watched(w, features)) { /* one contribution for each lobe */
         unsigned lobe;
         for (lobe = PT_LOBE_DIFFUSE; lobe <= PT_LOBE_GLOSSY; lobe <<= 1) {
             if (!(bsdf->lobes & lobe)) continue;
+#if PTI_HAS_OBSERVER
             if (w->edges <= PT_WORD_MAX) w->letters[w->edges - 1] = pti_letter(lobe);
+#endif
             f = pt_bsdf_eval(bsdf, wo, ls.wi, PT_RADIANCE, lobe);
-            pti_contribute(w, pt_rgb_mul(f, ls.radiance), weight, w->edges + 1, features);
+            pti_contribute(w, pt_rgb_mul(f, ls.radiance), lobe == PT_LOBE_DIFFUSE ? diffuse_weight : weight, w->edges + 1, lobe, features);
         }
         return;
     }
 #endif
-    pti_contribute(w, pt_rgb_mul(f, ls.radiance), weight, w->edges + 1, features);
+    (void)diffuse_weight;
+    pti_contribute(w, pt_rgb_mul(f, ls.radiance), weight, w->edges + 1, 0, features);
 }
 
+#if PTI_HAS_WHITTED
+/* Takes the diffuse part out of the direction just drawn: light that it would find is left to light sampling
+   alone. */
+static void pti_drop_diffuse(pti_walk *w, const pt_bsdf *bsdf, pt_vec3 wo, const pt_bsdf_sample_result *s)
+{
+    pt_rgbd share;
+    if (s->lobe == PT_LOBE_SPECULAR || !(bsdf->lobes & PT_LOBE_DIFFUSE)) return;
+    share = pti_lobe_share(bsdf, wo, s->wi, PT_LOBE_GLOSSY);
+    w->beta = pt_rgbd3(w->beta.r * share.r, w->beta.g * share.g, w->beta.b * share.b);
+}
+#endif
+
 /* Draws the next direction; 0 = the walk ends. */
-PTI_INLINE int pti_extend(pti_walk *w, const pt_bsdf *bsdf, pt_vec3 wo, const unsigned features)
+PTI_INLINE int pti_extend(pti_walk *w, const pt_bsdf *bsdf, pt_vec3 wo, const unsigned features, const int technique)
 {
     uint32_t dimension = PT_DIM_EDGE(w->edges);
     pt_bsdf_sample_result s;
@@ -5394,6 +7246,9 @@ PTI_INLINE int pti_extend(pti_walk *w, const pt_bsdf *bsdf, pt_vec3 wo, const un
         if (!pt_bsdf_sample(bsdf, wo, u_lobe, u, PT_RADIANCE, &s)) return 0;
         w->specular = s.lobe == PT_LOBE_SPECULAR;
         w->eta2 *= (double)s.eta * (double)s.eta;
+#if PTI_HAS_LPE
+        if ((features & PTI_WITH_LPE) && w->lpe) pti_advance(w->lpe, w->share, bsdf, wo, &s, technique == PTI_TECHNIQUE_DISTRIBUTION);
+#endif
     } else {
         if (!pti_sample_diffuse(bsdf, wo, u, &s)) return 0;
         w->specular = 0;
@@ -5403,6 +7258,10 @@ PTI_INLINE int pti_extend(pti_walk *w, const pt_bsdf *bsdf, pt_vec3 wo, const un
 #endif
     w->pdf_w = s.pdf_w;
     w->beta = pt_rgbd3(w->beta.r * (double)s.weight.r, w->beta.g * (double)s.weight.g, w->beta.b * (double)s.weight.b);
+#if PTI_HAS_WHITTED
+    if (technique == PTI_TECHNIQUE_DISTRIBUTION) pti_drop_diffuse(w, bsdf, wo, &s);
+#endif
+    (void)technique;
     w->ray = pt_spawn_ray(w->hit.p, w->hit.p_error, w->hit.ng, s.wi);
     return w->beta.r > 0 || w->beta.g > 0 || w->beta.b > 0;
 }
@@ -5425,13 +7284,26 @@ PTI_INLINE int pti_roulette(pti_walk *w)
 }
 
 /* What the first surface is, for the auxiliary pictures. */
-static void pti_describe_first_hit(const pti_walk *w, pt_li_info *info)
+static void pti_describe_first_hit(const pt_hit *hit, const pt_bsdf *bsdf, pt_li_info *info)
 {
-    const pt_material *m = &w->scene->materials[w->hit.material];
+    const pt_material *m = bsdf->material;
     info->hit = 1;
-    info->albedo = m->kind == PT_MATERIAL_DIELECTRIC ? pt_rgb_grey(1) : m->albedo;
-    info->normal = w->hit.ns;
-    info->depth = w->hit.t;
+    info->albedo = m->kind == PT_MATERIAL_DIELECTRIC ? pt_rgb_grey(1) : pt_rgb_add(bsdf->albedo, m->specular);
+    info->normal = hit->ns;
+    info->depth = hit->t;
+}
+
+/* Emission of the background where the walk leaves the scene. */
+PTI_INLINE void pti_contribute_environment(pti_walk *w, const int technique, const unsigned features)
+{
+#if PTI_HAS_ENVIRONMENT
+    pt_rgb emission = pt_environment_radiance(w->scene, w->ray.d);
+    if (!pti_rgb_black(emission))
+        pti_contribute(w, emission, pti_emission_weight(w, w->scene->environment_light, NULL, technique), w->edges, 0, features);
+#endif
+    (void)w;
+    (void)technique;
+    (void)features;
 }
 
 PTI_INLINE pt_rgbd pti_path(const pt_scene *scene, const pt_ray *ray, pt_sampler *sampler, const pt_li_options *options,
@@ -5450,6 +7322,13 @@ PTI_INLINE pt_rgbd pti_path(const pt_scene *scene, const pt_ray *ray, pt_sampler
     w.pdf_w = 0;
     w.specular = 1; /* what the camera sees directly, nothing else finds */
     w.rays = 0;
+#if PTI_HAS_LPE
+    if (features & PTI_WITH_LPE) {
+        w.lpe = options->lpe;
+        w.classes = info->classes;
+        if (w.lpe) pti_share_start(w.lpe, w.share);
+    }
+#endif
     info->hit = 0;
     info->cancelled = 0;
     for (w.edges = 1;; w.edges++) {
@@ -5459,21 +7338,20 @@ PTI_INLINE pt_rgbd pti_path(const pt_scene *scene, const pt_ray *ray, pt_sampler
         w.rays++;
         if (!pt_intersect(scene, &w.ray, &w.hit)) {
             if ((features & PTI_WITH_ENVIRONMENT) && scene->environment_light >= 0)
-                pti_contribute(&w, scene->environment, pti_emission_weight(&w, scene->environment_light, NULL, technique),
-                               w.edges, features);
+                pti_contribute_environment(&w, technique, features);
             break;
         }
-        if (w.edges == 1) pti_describe_first_hit(&w, info);
+        bsdf = pt_bsdf_make(&scene->materials[w.hit.material], &w.hit);
+        if (w.edges == 1) pti_describe_first_hit(&w.hit, &bsdf, info);
         if (w.hit.light >= 0) {
             emission = pt_hit_emission(scene, &w.hit, wo);
             if (!pti_rgb_black(emission))
-                pti_contribute(&w, emission, pti_emission_weight(&w, w.hit.light, &w.hit, technique), w.edges, features);
+                pti_contribute(&w, emission, pti_emission_weight(&w, w.hit.light, &w.hit, technique), w.edges, 0, features);
         }
         if (w.edges == options->max_edges) break;
-        bsdf = pt_bsdf_make(&scene->materials[w.hit.material], &w.hit);
         if (!bsdf.lobes) break; /* black */
         if (technique != PTI_TECHNIQUE_PLAIN) pti_direct(&w, &bsdf, wo, features, technique);
-        if (!pti_extend(&w, &bsdf, wo, features) || !pti_roulette(&w)) break;
+        if (!pti_extend(&w, &bsdf, wo, features, technique) || !pti_roulette(&w)) break;
         if ((w.edges & 0xffff) == 0 && options->poll && options->poll(options->poll_user)) {
             info->cancelled = 1;
             break;
@@ -5517,6 +7395,223 @@ PTDEF pt_rgbd pt_li_path_light(const pt_scene *scene, const pt_ray *ray, pt_samp
     return pti_path_general(scene, ray, sampler, options, info, PTI_TECHNIQUE_LIGHT);
 }
 #endif
+
+#if PTI_HAS_WHITTED
+/* --- before path tracing --- */
+
+/* Light from the middle of light k as if all of it came from there: irradiance across the direction; 0: none. */
+static int pti_middle_of_light(const pt_scene *scene, int k, const pt_hit *hit, pt_vec3 wo, pt_light_sample_result *ls)
+{
+    pt_vec3 p = pti_offset(hit->p, hit->p_error, hit->ng, wo);
+    if (!pt_light_sample(scene, k, p, pt_v2(PTI_R(0.5), PTI_R(0.5)), ls)) return 0;
+    ls->radiance = pt_rgb3((pt_real)((double)ls->radiance.r / ls->pdf_w), (pt_real)((double)ls->radiance.g / ls->pdf_w),
+                           (pt_real)((double)ls->radiance.b / ls->pdf_w));
+    return 1;
+}
+
+static void pti_add_product(pt_rgbd *sum, pt_rgbd beta, pt_rgb value, double k)
+{
+    sum->r += beta.r * (double)value.r * k;
+    sum->g += beta.g * (double)value.g * k;
+    sum->b += beta.b * (double)value.b * k;
+}
+
+/* A ray with a unit direction and no end: its first hit with BSDF and emission. 0: it left the scene, and
+   `emission` is the background's. */
+static int pti_look(const pt_scene *scene, const pt_ray *ray, pt_hit *hit, pt_bsdf *bsdf, pt_rgb *emission, pt_li_info *info)
+{
+    info->rays++;
+    *emission = pt_rgb_grey(0);
+    if (!pt_intersect(scene, ray, hit)) {
+#if PTI_HAS_ENVIRONMENT
+        *emission = pt_environment_radiance(scene, ray->d);
+#endif
+        return 0;
+    }
+    *emission = pt_hit_emission(scene, hit, pt_v3_neg(ray->d));
+    *bsdf = pt_bsdf_make(&scene->materials[hit->material], hit);
+    return 1;
+}
+
+/* What the methods below share at their start. */
+static pt_ray pti_first_ray(const pt_ray *ray, pt_li_info *info)
+{
+    pt_ray r = *ray;
+    r.d = pt_v3_normalize(ray->d);
+    r.tmax = PTI_REAL_MAX;
+    info->hit = info->cancelled = 0;
+    info->edges = 1;
+    return r;
+}
+
+PTDEF pt_rgbd pt_li_local(const pt_scene *scene, const pt_ray *ray, pt_sampler *sampler, const pt_li_options *options,
+                          pt_li_info *info)
+{
+    const pt_rgbd one = pt_rgbd3(1, 1, 1);
+    pt_ray r = pti_first_ray(ray, info);
+    pt_vec3 wo = pt_v3_neg(r.d), n;
+    pt_light_sample_result ls;
+    pt_rgb emission;
+    pt_rgbd sum = pt_rgbd3(0, 0, 0);
+    pt_bsdf bsdf;
+    pt_hit hit;
+    uint32_t k;
+    int seen = pti_look(scene, &r, &hit, &bsdf, &emission, info);
+    (void)sampler;
+    pti_add_product(&sum, one, emission, 1);
+    if (!seen) return sum;
+    pti_describe_first_hit(&hit, &bsdf, info);
+    pti_add_product(&sum, one, pt_rgb_mul(options->ambient, bsdf.albedo), 1);
+    n = pt_v3_scale(hit.ns, pti_side(&bsdf, wo));
+    for (k = 0; k < scene->light_count; k++) {
+        double nl, nh;
+        if (scene->lights[k].kind == PT_LIGHT_ENVIRONMENT || !pti_middle_of_light(scene, (int)k, &hit, wo, &ls)) continue;
+        nl = fmax(0, (double)pt_v3_dot(n, ls.wi));
+        nh = fmax(0, (double)pt_v3_dot(n, pt_v3_normalize(pt_v3_add(wo, ls.wi))));
+        pti_add_product(&sum, one, pt_rgb_mul(bsdf.albedo, ls.radiance), nl);
+        pti_add_product(&sum, one, pt_rgb_mul(bsdf.material->specular, ls.radiance), pow(nh, (double)bsdf.material->exponent));
+    }
+    return sum;
+}
+
+/* A ray of the tree that waits to be followed. */
+typedef struct pti_branch {
+    pt_ray ray;
+    pt_rgbd beta;
+    int edges;
+} pti_branch;
+
+enum { PTI_TREE_EDGES = 12, PTI_TREE_MOST = 64 };
+
+/* Direct light at a vertex of the tree from the middle of each light. */
+static void pti_whitted_direct(const pt_scene *scene, const pti_branch *b, const pt_hit *hit, const pt_bsdf *bsdf, pt_rgbd *sum, pt_li_info *info)
+{
+    pt_vec3 wo = pt_v3_neg(b->ray.d);
+    pt_light_sample_result ls;
+    uint32_t k;
+    for (k = 0; k < scene->light_count; k++) {
+        pt_ray shadow;
+        pt_rgb f;
+        if (!pti_middle_of_light(scene, (int)k, hit, wo, &ls)) continue;
+        f = pt_bsdf_eval(bsdf, wo, ls.wi, PT_RADIANCE, PT_LOBE_ALL);
+        if (pti_rgb_black(f)) continue;
+        shadow = ls.infinite ? pt_spawn_ray(hit->p, hit->p_error, hit->ng, ls.wi) : pt_spawn_ray_to(hit->p, hit->p_error, hit->ng, ls.p, ls.p_error, ls.n);
+        info->rays++;
+        if (pt_occluded(scene, &shadow)) continue;
+        pti_add_product(sum, b->beta, pt_rgb_mul(f, ls.radiance), fabs((double)pt_v3_dot(ls.wi, bsdf->frame.n)));
+    }
+}
+
+/* Puts the specular continuations of a vertex on the stack: both, reflection and refraction, each with its whole
+   weight: that of the sample times the probability with which it would be drawn. */
+static int pti_whitted_branch(const pti_branch *b, const pt_hit *hit, const pt_bsdf *bsdf, pti_branch *stack)
+{
+    int k, n = 0;
+    for (k = 0; k < 2; k++) {
+        pt_bsdf_sample_result s;
+        pt_vec3 wo = pt_v3_neg(b->ray.d);
+        if (!pt_bsdf_sample(bsdf, wo, k == 0 ? 0 : 1 - PTI_2_M53, pt_v2(PTI_R(0.5), PTI_R(0.5)), PT_RADIANCE, &s)) continue;
+        if (s.lobe != PT_LOBE_SPECULAR || !(s.pdf_w > 0)) continue;
+        stack[n].beta = pt_rgbd3(0, 0, 0);
+        pti_add_product(&stack[n].beta, b->beta, s.weight, (double)s.pdf_w);
+        stack[n].ray = pt_spawn_ray(hit->p, hit->p_error, hit->ng, s.wi);
+        stack[n++].edges = b->edges + 1;
+        if (s.pdf_w >= 1) break; /* nothing is left for the other */
+    }
+    return n;
+}
+
+PTDEF pt_rgbd pt_li_whitted(const pt_scene *scene, const pt_ray *ray, pt_sampler *sampler, const pt_li_options *options,
+                            pt_li_info *info)
+{
+    pti_branch stack[PTI_TREE_MOST + 2], b; /* a vertex takes one off and puts at most two on, an edge deeper */
+    pt_rgbd sum = pt_rgbd3(0, 0, 0);
+    int most = options->max_edges > 0 ? options->max_edges : PTI_TREE_EDGES, top = 1;
+    (void)sampler;
+    if (most > PTI_TREE_MOST) most = PTI_TREE_MOST;
+    stack[0].ray = pti_first_ray(ray, info);
+    stack[0].beta = pt_rgbd3(1, 1, 1);
+    stack[0].edges = 1;
+    while (top > 0) {
+        pt_rgb emission;
+        pt_bsdf bsdf;
+        pt_hit hit;
+        int seen;
+        b = stack[--top];
+        if ((info->rays & 0xffff) == 0 && options->poll && options->poll(options->poll_user)) {
+            info->cancelled = 1;
+            break;
+        }
+        seen = pti_look(scene, &b.ray, &hit, &bsdf, &emission, info);
+        pti_add_product(&sum, b.beta, emission, 1);
+        if (!seen) continue;
+        if (b.edges == 1) pti_describe_first_hit(&hit, &bsdf, info);
+        if (b.edges > info->edges) info->edges = b.edges;
+        if (b.edges >= most) continue;
+        pti_whitted_direct(scene, &b, &hit, &bsdf, &sum, info);
+        top += pti_whitted_branch(&b, &hit, &bsdf, stack + top);
+    }
+    return sum;
+}
+
+PTDEF pt_rgbd pt_li_distribution(const pt_scene *scene, const pt_ray *ray, pt_sampler *sampler,
+                                 const pt_li_options *options, pt_li_info *info)
+{
+    pt_li_options o = *options;
+    if (o.max_edges == 0) o.max_edges = PTI_TREE_EDGES;
+    return pti_path_general(scene, ray, sampler, &o, info, PTI_TECHNIQUE_DISTRIBUTION);
+}
+
+/* The branching solver under way. */
+typedef struct pti_solver {
+    const pt_scene *scene;
+    const pt_li_options *options;
+    pt_li_info *info;
+    pt_pcg32 random;
+    int branching, most;
+} pti_solver;
+
+/* L(ray) = Le + 1/N sum of f cos / p L(next): the equation itself. The depth is at most PTI_TREE_MOST. */
+static pt_rgbd pti_solve(pti_solver *s, const pt_ray *ray, int edges)
+{
+    pt_rgbd sum = pt_rgbd3(0, 0, 0);
+    pt_rgb emission;
+    pt_bsdf bsdf;
+    pt_hit hit;
+    int k, seen = pti_look(s->scene, ray, &hit, &bsdf, &emission, s->info);
+    pti_add_product(&sum, pt_rgbd3(1, 1, 1), emission, 1);
+    if (!seen) return sum;
+    if (edges == 1) pti_describe_first_hit(&hit, &bsdf, s->info);
+    if (edges > s->info->edges) s->info->edges = edges;
+    for (k = 0; k < s->branching && edges < s->most && !s->info->cancelled; k++) {
+        pt_bsdf_sample_result b;
+        pt_ray next;
+        pt_vec2 u = pti_pcg32_pair(&s->random);
+        if ((s->info->rays & 0xffff) == 0 && s->options->poll && s->options->poll(s->options->poll_user)) s->info->cancelled = 1;
+        if (!pt_bsdf_sample(&bsdf, pt_v3_neg(ray->d), pt_pcg32_double(&s->random), u, PT_RADIANCE, &b)) continue;
+        next = pt_spawn_ray(hit.p, hit.p_error, hit.ng, b.wi);
+        pti_add_product(&sum, pti_solve(s, &next, edges + 1), b.weight, 1.0 / s->branching);
+    }
+    return sum;
+}
+
+PTDEF pt_rgbd pt_li_branching(const pt_scene *scene, const pt_ray *ray, pt_sampler *sampler,
+                              const pt_li_options *options, pt_li_info *info)
+{
+    pt_ray r = pti_first_ray(ray, info);
+    pti_solver s;
+    s.scene = scene;
+    s.options = options;
+    s.info = info;
+    s.branching = options->branching > 0 ? options->branching : 4;
+    s.most = options->max_edges > 0 ? options->max_edges : 4;
+    if (s.most > PTI_TREE_MOST) s.most = PTI_TREE_MOST;
+    pt_sampler_seek(sampler, PT_DIM_EDGE(1)); /* a tree needs more numbers than a path has dimensions: a stream of its own */
+    s.random = pt_pcg32_make((uint64_t)(pti_draw(sampler) * 9007199254740992.0), pt_hash64(sampler->key ^ sampler->index));
+    return pti_solve(&s, &r, 1);
+}
+#endif
+
 
 /* =====================================================================================================
    [PT-17] IMAGE FILES: implementation
@@ -5609,6 +7704,147 @@ PTDEF pt_result pt_write_pfm_floats(const char *path, const float *rgb, int widt
         }
     return pti_writer_close(&w, path);
 }
+
+/* --- reading --- */
+
+PTDEF void pt_image_free(pt_image *image)
+{
+    pti_free(image->rgb, image->alloc_user);
+    image->rgb = NULL;
+    image->width = image->height = 0;
+}
+
+/* The next word of a PNM header: blanks and comments before it are skipped, one blank after it is taken. 0: none, or
+   too long. */
+static int pti_read_word(FILE *file, char *word, size_t size)
+{
+    size_t n = 0;
+    int c = fgetc(file);
+    while (c == ' ' || c == '\t' || c == '\r' || c == '\n' || c == '#') {
+        if (c == '#')
+            while (c != '\n' && c != EOF) c = fgetc(file);
+        c = fgetc(file);
+    }
+    for (; c != EOF && c != ' ' && c != '\t' && c != '\r' && c != '\n'; c = fgetc(file)) {
+        if (n + 1 >= size) return 0;
+        word[n++] = (char)c;
+    }
+    word[n] = 0;
+    return n > 0;
+}
+
+/* A whole number of at most 6 digits; -1: it is none. */
+static int pti_read_count(FILE *file)
+{
+    char word[8];
+    int value = 0, i;
+    if (!pti_read_word(file, word, sizeof word) || strlen(word) > 6) return -1;
+    for (i = 0; word[i]; i++) {
+        if (word[i] < '0' || word[i] > '9') return -1;
+        value = 10 * value + (word[i] - '0');
+    }
+    return value;
+}
+
+/* The pixels after the header; `kind`: 0 = bytes, 1 = floats little-endian, 2 = big-endian. */
+static int pti_read_pixels(FILE *file, pt_image *image, int kind)
+{
+    size_t row = 3 * (size_t)image->width, i;
+    int y, k;
+    for (y = 0; y < image->height; y++) {
+        float *to = image->rgb + row * (size_t)(kind ? image->height - 1 - y : y); /* PFM begins at the bottom */
+        for (i = 0; i < row; i++) {
+            unsigned char b[4];
+            uint32_t bits = 0;
+            if (fread(b, 1, kind ? 4 : 1, file) != (size_t)(kind ? 4 : 1)) return 0;
+            for (k = 0; kind && k < 4; k++) bits |= (uint32_t)b[kind == 1 ? k : 3 - k] << (8 * k);
+            if (kind) memcpy(&to[i], &bits, 4);
+            else to[i] = (float)pt_srgb_decode(b[0] / 255.0);
+        }
+    }
+    return 1;
+}
+
+static pt_result pti_read_image(FILE *file, pt_image *image)
+{
+    char word[32];
+    int kind = -1, width, height;
+    if (!pti_read_word(file, word, sizeof word)) return PT_ERROR_FILE;
+    if (strcmp(word, "P6") == 0) kind = 0;
+    if (strcmp(word, "PF") == 0) kind = 1;
+    width = pti_read_count(file);
+    height = pti_read_count(file);
+    if (kind < 0 || !pti_image_size_ok(width, height) || !pti_read_word(file, word, sizeof word)) return PT_ERROR_FILE;
+    if (kind == 0 && strcmp(word, "255") != 0) return PT_ERROR_FILE;
+    if (kind == 1 && word[0] != '-') kind = 2;
+    image->rgb = (float *)pti_alloc(3 * (size_t)width * (size_t)height, sizeof *image->rgb, image->alloc_user);
+    if (!image->rgb) return PT_ERROR_MEMORY;
+    image->width = width;
+    image->height = height;
+    return pti_read_pixels(file, image, kind) ? PT_OK : PT_ERROR_FILE;
+}
+
+PTDEF pt_result pt_read_image(const char *path, pt_image *image)
+{
+    pt_result result = PT_ERROR_FILE;
+    FILE *file = path ? fopen(path, "rb") : NULL;
+    pt_image_free(image);
+    if (!file) return result;
+    result = pti_read_image(file, image);
+    fclose(file);
+    if (result != PT_OK) pt_image_free(image);
+    return result;
+}
+
+#if PTI_HAS_MEASURED
+static const unsigned char pti_merl_head[12] = {90, 0, 0, 0, 90, 0, 0, 0, 180, 0, 0, 0};
+
+PTDEF pt_result pt_measured_write(const char *path, const pt_measured *m)
+{
+    pti_writer w;
+    size_t i;
+    int k;
+    if (!m->value) return PT_ERROR_ARGUMENT;
+    if (!pti_writer_open(&w, path)) return PT_ERROR_FILE;
+    pti_write(&w, pti_merl_head, sizeof pti_merl_head);
+    for (i = 0; i < 3 * (size_t)PT_MEASURED_CELLS; i++) {
+        unsigned char bytes[8];
+        uint64_t bits;
+        memcpy(&bits, &m->value[i], 8);
+        for (k = 0; k < 8; k++) bytes[k] = (unsigned char)((bits >> (8 * k)) & 255u);
+        pti_write(&w, bytes, 8);
+    }
+    return pti_writer_close(&w, path);
+}
+
+static int pti_merl_read_values(FILE *file, double *value)
+{
+    unsigned char b[12];
+    size_t i;
+    int k;
+    if (fread(b, 1, 12, file) != 12 || memcmp(b, pti_merl_head, 12) != 0) return 0;
+    for (i = 0; i < 3 * (size_t)PT_MEASURED_CELLS; i++) {
+        uint64_t bits = 0;
+        if (fread(b, 1, 8, file) != 8) return 0;
+        for (k = 0; k < 8; k++) bits |= (uint64_t)b[k] << (8 * k);
+        memcpy(&value[i], &bits, 8);
+        if (!pti_finite(value[i])) return 0;
+    }
+    return 1;
+}
+
+PTDEF pt_result pt_measured_read(const char *path, pt_measured *m)
+{
+    FILE *file = path ? fopen(path, "rb") : NULL;
+    pt_result result = pti_merl_make(m);
+    if (!file) result = PT_ERROR_FILE;
+    if (result == PT_OK && !pti_merl_read_values(file, m->value)) result = PT_ERROR_FILE;
+    if (file) fclose(file);
+    if (result == PT_OK) pti_merl_finish(m);
+    else pt_measured_free(m);
+    return result;
+}
+#endif
 
 /* --- PNG: zlib stream of one deflate block with fixed Huffman codes (RFC 1950, 1951, PNG specification) --- */
 
@@ -5858,12 +8094,22 @@ PTDEF pt_result pt_write_pfm(const char *path, const pt_film *film)
 
 PTDEF const pt_method *pt_methods(int *count)
 {
-    enum { ALL = 0xfff };
+    enum {
+        ALL = PT_NEEDS_ALL,
+        HIT = ALL & ~(PT_NEEDS_POINT_LIGHTS | PT_NEEDS_SPOT_LIGHTS | PT_NEEDS_DIRECTIONAL_LIGHTS), /* lights that can be hit */
+        SEEN = ALL & ~(PT_NEEDS_ENVIRONMENT | PT_NEEDS_ENVIRONMENT_IMAGE)                          /* lights with a middle   */
+    };
     static const pt_method methods[] = {
-        {"path", "path tracing, light and BSDF sampling combined (MIS)", pt_li_path, ALL},
+        {"path", "path tracing, light and BSDF sampling combined (MIS)", pt_li_path, ALL, 1, 1},
 #if PTI_HAS_ALL_METHODS
-        {"path-light", "path tracing, light sampling only", pt_li_path_light, ALL},
-        {"path-plain", "path tracing, light found by hitting it", pt_li_path_plain, ALL & ~PT_NEEDS_POINT_LIGHTS},
+        {"path-light", "path tracing, light sampling only", pt_li_path_light, ALL, 1, 1},
+        {"path-plain", "path tracing, light found by hitting it", pt_li_path_plain, HIT, 1, 1},
+#endif
+#if PTI_HAS_WHITTED
+        {"local", "local Phong lighting of the slides, without shadows", pt_li_local, SEEN, 0, 0},
+        {"whitted", "Whitted: a tree of mirror and refracted rays, hard shadows", pt_li_whitted, SEEN, 0, 0},
+        {"distribution", "distribution ray tracing: pixel, lens, lights, gloss", pt_li_distribution, ALL, 0, 1},
+        {"branching", "the slides' solver: N directions at every hit", pt_li_branching, HIT, 0, 0},
 #endif
     };
     *count = (int)(sizeof methods / sizeof methods[0]);
@@ -5888,6 +8134,9 @@ static pt_li_fn pti_pick_instance(const pt_method *method, const pt_scene *scene
     int observed = 0;
 #if PTI_HAS_OBSERVER
     observed = desc->li.observer != NULL;
+#endif
+#if PTI_HAS_LPE
+    observed |= desc->li.lpe != NULL;
 #endif
     *body = "general";
     if (method->li != pt_li_path || desc->general_body || observed || (scene->needs & ~diffuse)) return method->li;
@@ -5942,6 +8191,51 @@ static void pti_hash_text(uint64_t *h, const char *text)
     for (; *text; text++) pti_hash_word(h, (unsigned char)*text);
 }
 
+/* Textures and tables. A texture that is a function is known by its scale only. */
+static void pti_hash_borrowed(uint64_t *h, const pt_material *m)
+{
+    size_t i;
+#if PTI_HAS_TEXTURES
+    const pt_texture *t = m->texture;
+    if (t) {
+        pti_hash_word(h, (uint64_t)t->kind << 32 | (uint64_t)t->width);
+        pti_hash_word(h, (uint64_t)t->height);
+        pti_hash_vec(h, pt_v3(t->scale.x, t->scale.y, 0));
+        pti_hash_rgb(h, t->a);
+        pti_hash_rgb(h, t->b);
+        for (i = 0; t->kind == PT_TEXTURE_IMAGE && i < 3 * (size_t)t->width * (size_t)t->height; i++) pti_hash_double(h, (double)t->rgb[i]);
+    }
+#endif
+#if PTI_HAS_MEASURED
+    for (i = 0; m->measured && i < 3 * (size_t)PT_MEASURED_CELLS; i++) pti_hash_double(h, m->measured->value[i]);
+#endif
+    (void)h;
+    (void)m;
+    (void)i;
+}
+
+static void pti_hash_lights(uint64_t *h, const pt_scene *s)
+{
+    uint32_t i;
+    for (i = 0; i < s->delta_light_count; i++) {
+        pti_hash_word(h, (uint64_t)s->delta_lights[i].kind);
+        pti_hash_vec(h, s->delta_lights[i].position);
+        pti_hash_vec(h, s->delta_lights[i].direction);
+        pti_hash_rgb(h, s->delta_lights[i].intensity);
+        pti_hash_double(h, s->delta_lights[i].cos_start);
+        pti_hash_double(h, s->delta_lights[i].cos_end);
+    }
+    pti_hash_rgb(h, s->environment);
+#if PTI_HAS_ENVIRONMENT
+    if (s->map.rgb) {
+        size_t k;
+        pti_hash_word(h, (uint64_t)s->map.width << 32 | (uint64_t)s->map.height);
+        pti_hash_double(h, s->map.scale);
+        for (k = 0; k < 3 * (size_t)s->map.width * (size_t)s->map.height; k++) pti_hash_double(h, (double)s->map.rgb[k]);
+    }
+#endif
+}
+
 static void pti_hash_scene(uint64_t *h, const pt_scene *s)
 {
     uint32_t i;
@@ -5955,9 +8249,16 @@ static void pti_hash_scene(uint64_t *h, const pt_scene *s)
         pti_hash_rgb(h, s->materials[i].albedo);
         pti_hash_rgb(h, s->materials[i].emission);
         pti_hash_double(h, (double)s->materials[i].ior);
+        pti_hash_double(h, (double)s->materials[i].roughness);
+        pti_hash_rgb(h, s->materials[i].eta);
+        pti_hash_rgb(h, s->materials[i].k);
+        pti_hash_rgb(h, s->materials[i].specular);
+        pti_hash_double(h, (double)s->materials[i].exponent);
+        pti_hash_borrowed(h, &s->materials[i]);
     }
     for (i = 0; i < s->position_count; i++) pti_hash_vec(h, s->positions[i]);
     for (i = 0; i < s->normal_count; i++) pti_hash_vec(h, s->normals[i]);
+    for (i = 0; i < s->uv_count; i++) pti_hash_vec(h, pt_v3(s->uvs[i].x, s->uvs[i].y, 0));
     for (i = 0; i < s->triangle_count; i++) {
         pti_hash_word(h, (uint64_t)s->triangles[i].v[0] << 32 | s->triangles[i].v[1]);
         pti_hash_word(h, (uint64_t)s->triangles[i].v[2] << 32 | (uint32_t)s->triangles[i].material);
@@ -5974,11 +8275,7 @@ static void pti_hash_scene(uint64_t *h, const pt_scene *s)
         pti_hash_vec(h, s->parallelograms[i].edge2);
         pti_hash_word(h, (uint64_t)s->parallelograms[i].material);
     }
-    for (i = 0; i < s->point_light_count; i++) {
-        pti_hash_vec(h, s->point_lights[i].position);
-        pti_hash_rgb(h, s->point_lights[i].intensity);
-    }
-    pti_hash_rgb(h, s->environment);
+    pti_hash_lights(h, s);
 }
 
 /* What the bits of a film depend on. `planned` is the sample count of the stratified sampler, else 0. */
@@ -6002,6 +8299,20 @@ static uint64_t pti_fingerprint(const pt_scene *scene, const pt_render_desc *d, 
     pti_hash_word(&h, (uint64_t)d->li.max_edges << 32 | (uint64_t)d->li.roulette << 16 | (uint64_t)d->li.heuristic);
     pti_hash_double(&h, (double)d->li.roulette_survival);
     pti_hash_word(&h, (uint64_t)d->li.roulette_start << 1 | (uint64_t)(d->single_net != 0));
+    pti_hash_word(&h, (uint64_t)d->filter);
+    pti_hash_double(&h, d->filter_radius);
+#if PTI_HAS_WHITTED
+    pti_hash_word(&h, (uint64_t)d->li.branching);
+    pti_hash_rgb(&h, d->li.ambient);
+#endif
+#if PTI_HAS_LPE
+    if (d->li.lpe) {
+        int state, letter;
+        for (state = 0; state < d->li.lpe->state_count; state++)
+            for (letter = 0; letter < 4; letter++)
+                pti_hash_word(&h, (uint64_t)d->li.lpe->class_of[state] << 8 | d->li.lpe->next[state][letter]);
+    }
+#endif
     return h;
 }
 
@@ -6046,16 +8357,34 @@ static void pti_render_sample(pti_pass *p, pt_sampler *sampler, int x, int y, ui
     pt_vec2 u, lens = pt_v2(0, 0);
     pt_rgbd L;
     pt_ray ray;
+#if PTI_HAS_LPE
+    pt_rgbd classes[PT_LPE_EXPRESSIONS + 1];
+    int k;
+#endif
+    int finite;
     /* Each half is a net of its own: another stream. */
     pt_sampler_start(sampler, 2 * (uint64_t)pixel + half, d->single_net ? sample : sample >> 1);
     u = pt_sampler_2d(sampler);
     if (d->camera.lens_radius > 0) lens = pt_sampler_2d(sampler);
+    if (d->filter != PT_FILTER_BOX || d->filter_radius > 0) {
+        u = pt_filter_sample(d->filter, d->filter_radius, u);
+        u = pt_v2(u.x + PTI_R(0.5), u.y + PTI_R(0.5));
+    }
     ray = pt_camera_ray(&d->camera, (pt_real)d->width / (pt_real)d->height, ((pt_real)x + u.x) / (pt_real)d->width,
                         ((pt_real)y + u.y) / (pt_real)d->height, lens);
+#if PTI_HAS_LPE
+    info->classes = classes;
+    if (film->classes) memset(classes, 0, sizeof classes);
+#endif
     L = p->li(p->scene, &ray, sampler, &p->options, info);
     if (info->cancelled) return; /* and with it the whole pass */
-    if (pti_rgbd_finite(L)) pti_add3(film->half[half] + 3 * pixel, L.r, L.g, L.b);
+    finite = pti_rgbd_finite(L);
+    if (finite) pti_add3(film->half[half] + 3 * pixel, L.r, L.g, L.b);
     else PTI_ADD(&p->nonfinite, 1);
+#if PTI_HAS_LPE
+    for (k = 0; finite && k < film->class_count; k++)
+        pti_add3(film->classes + 3 * (pixel + (size_t)k * (size_t)d->width * (size_t)d->height), classes[k].r, classes[k].g, classes[k].b);
+#endif
     if (!film->albedo || !info->hit) return;
     pti_add3(film->albedo + 3 * pixel, (double)info->albedo.r, (double)info->albedo.g, (double)info->albedo.b);
     pti_add3(film->normal + 3 * pixel, (double)info->normal.x, (double)info->normal.y, (double)info->normal.z);
@@ -6119,11 +8448,13 @@ static void pti_render_tile(void *context, int index)
         }
 }
 
+enum { PTI_FILM_LAYERS = 6 };
+
 /* The sums of a film, in the order of `layer`; NULL where a layer is not there. */
 static double **pti_film_layer(pt_film *film, int layer, size_t *channels)
 {
-    double **layers[5] = {&film->half[0], &film->half[1], &film->albedo, &film->normal, &film->depth};
-    *channels = layer == 4 ? 1 : 3;
+    double **layers[PTI_FILM_LAYERS] = {&film->half[0], &film->half[1], &film->albedo, &film->normal, &film->depth, &film->classes};
+    *channels = layer == 5 ? 3 * (size_t)film->class_count : layer == 4 ? 1 : 3;
     return layers[layer];
 }
 
@@ -6138,7 +8469,7 @@ static pt_result pti_render_pass(pti_pass *p, pt_film *film, uint32_t begin, uin
     p->begin = begin;
     p->end = end;
     p->rays = p->pixels = p->nonfinite = 0;
-    for (k = 0; k < 5; k++) {
+    for (k = 0; k < PTI_FILM_LAYERS; k++) {
         double *from = *pti_film_layer(film, k, &channels), *to = *pti_film_layer(p->film, k, &channels);
         if (from) memcpy(to, from, pixels * channels * sizeof *to);
     }
@@ -6151,7 +8482,7 @@ static pt_result pti_render_pass(pti_pass *p, pt_film *film, uint32_t begin, uin
     film->samples[0] += end - begin - odd;
     film->samples[1] += odd;
     film->nonfinite += (uint64_t)p->nonfinite;
-    for (k = 0; k < 5; k++) {
+    for (k = 0; k < PTI_FILM_LAYERS; k++) {
         double **a = pti_film_layer(film, k, &channels), **b = pti_film_layer(p->film, k, &channels), *swap = *a;
         *a = *b;
         *b = swap;
@@ -6222,6 +8553,16 @@ static int pti_not_negative(double x)
     return x >= 0 && pti_finite(x);
 }
 
+/* Why there is no such method. */
+static const char *pti_method_left_out(const char *name)
+{
+    static const char *const names[6] = {"path-light", "path-plain", "local", "whitted", "distribution", "branching"};
+    int k;
+    for (k = 0; k < 6; k++)
+        if (strcmp(names[k], name) == 0) return k < 2 ? "desc.method was left out: PT_ONLY_PATH" : "desc.method was left out: PT_NO_WHITTED";
+    return "desc.method is unknown";
+}
+
 /* What is wrong with a desc (its defaults filled in), NULL if nothing. */
 static const char *pti_check_desc(const pt_render_desc *d)
 {
@@ -6250,9 +8591,29 @@ static const char *pti_check_desc(const pt_render_desc *d)
     if ((int)o->roulette < 0 || o->roulette > PT_ROULETTE_NONE) return "desc.li.roulette is unknown";
     if ((int)o->heuristic < 0 || o->heuristic > PT_HEURISTIC_MAXIMUM) return "desc.li.heuristic is unknown";
     if (!(o->roulette_survival >= 0 && o->roulette_survival < 1)) return "desc.li.roulette_survival is not in [0,1)";
+    if ((int)d->filter < 0 || d->filter > PT_FILTER_GAUSSIAN) return "desc.filter is unknown";
+    if (!(d->filter_radius >= 0 && d->filter_radius <= 64)) return "desc.filter_radius is not in [0, 64]";
+#if PTI_HAS_WHITTED
+    if (o->branching < 0 || o->branching > 1024) return "desc.li.branching is not in 0..1024";
+    if (!pti_rgb_finite(o->ambient)) return "desc.li.ambient is not finite";
+#endif
     if (o->roulette == PT_ROULETTE_NONE && o->max_edges == 0) return "without roulette desc.li.max_edges must end the paths";
-    if (!pt_method_find(d->method)) return "desc.method is unknown";
+    if (!pt_method_find(d->method)) return pti_method_left_out(d->method);
+#if PTI_HAS_LPE
+    if (o->lpe && !pt_method_find(d->method)->classes) return "desc.li.lpe: this method cannot tell classes of light paths apart";
+    if (o->lpe && (o->lpe->class_count < 1 || o->lpe->state_count < 1)) return "desc.li.lpe was not compiled";
+#endif
     return NULL;
+}
+
+/* How many classes of light paths are wanted. */
+static int pti_class_count(const pt_render_desc *d)
+{
+#if PTI_HAS_LPE
+    if (d->li.lpe) return d->li.lpe->class_count;
+#endif
+    (void)d;
+    return 0;
 }
 
 /* An empty film is made; a filled one must be of this picture and reach from first_sample without a gap. */
@@ -6262,9 +8623,10 @@ static pt_result pti_prepare_film(pt_film *film, const pt_render_desc *d, uint64
     if (film->half[0] && film->range_count > 0) {
         if (film->fingerprint != fingerprint || film->width != d->width || film->height != d->height) return PT_ERROR_MISMATCH;
         if (film->range_count != 1 || film->ranges[0].begin != d->first_sample) return PT_ERROR_MISMATCH;
-        return (film->albedo != NULL) == (d->aov != 0) ? PT_OK : PT_ERROR_MISMATCH;
+        return (film->albedo != NULL) == (d->aov != 0) && film->class_count == pti_class_count(d) ? PT_OK : PT_ERROR_MISMATCH;
     }
     result = pt_film_make(film, d->width, d->height, d->aov);
+    if (result == PT_OK && pti_class_count(d) > 0) result = pt_film_make_classes(film, pti_class_count(d));
     film->fingerprint = fingerprint;
     return result;
 }
@@ -6360,6 +8722,7 @@ static pt_result pti_render(pti_pass *p, pt_film *film, pt_report *report)
     if (result == PT_ERROR_MISMATCH) report->error = "the film holds another picture, or other samples";
     copy.alloc_user = film->alloc_user;
     if (result == PT_OK) result = pt_film_make(&copy, d->width, d->height, d->aov);
+    if (result == PT_OK && film->class_count > 0) result = pt_film_make_classes(&copy, film->class_count);
     if (result == PT_OK) result = pti_run_passes(p, film, report);
     pt_film_free(&copy);
     return result;
@@ -6772,7 +9135,7 @@ static void pti_cornell_build(pt_scene *scene, pt_camera *camera, int count)
     }
     /* film 25 mm square behind a lens of 35 mm */
     *camera = pt_camera_look_at(pt_v3(278, 273, -800), pt_v3(278, 273, 0), pt_v3(0, 1, 0),
-                                (pt_real)(2 * atan(0.5 * 0.025 / 0.035) * 180 / PT_PI));
+                                (pt_real)pt_vfov_deg_of_film(0.025, 0.035));
 }
 
 PTDEF pt_result pt_scene_cornell(pt_scene *scene, pt_camera *camera)
@@ -6860,10 +9223,158 @@ PTDEF pt_result pt_scene_smallpt(pt_scene *scene, pt_camera *camera)
         pt_add_sphere(scene, pt_v3((pt_real)s[i].x, (pt_real)s[i].y, (pt_real)s[i].z), (pt_real)s[i].r,
                       pt_add_material(scene, m));
     }
-    *camera = pt_camera_look_at(eye, pt_v3_add(eye, d), pt_v3(0, 1, 0), (pt_real)(2 * atan(0.5 * 0.5135) * 180 / PT_PI));
+    *camera = pt_camera_look_at(eye, pt_v3_add(eye, d), pt_v3(0, 1, 0), (pt_real)pt_vfov_deg_of_film(0.5135, 1));
     camera->near_distance = 140;
     return pt_commit(scene);
 }
+
+/* Four spheres of equal power and four plates of rising roughness; after E. Veach and L. Guibas, 1995, with the
+   positions of S. Marschner's reconstruction. The plates are aluminium; alpha = roughness^2. */
+PTDEF pt_result pt_scene_veach_plates(pt_scene *scene, pt_camera *camera)
+{
+    static const struct {
+        double x, y, z, r, emission;
+    } lamp[5] = {{-3.75, 0, 0, 0.03333, 901.803}, {-1.25, 0, 0, 0.1, 100}, {1.25, 0, 0, 0.3, 11.1111}, {3.75, 0, 0, 0.9, 1.23457}, {0, 4, 3, 1, 1}};
+    static const double plate[4][5] = {{-2.70651, 0.25609, -2.08375, -0.526323, 0.005}, /* y, z of both edges, alpha */
+                                       {-3.28825, 1.36972, -2.83856, 0.476536, 0.02},
+                                       {-3.73096, 2.70046, -3.43378, 1.74564, 0.05},
+                                       {-3.99615, 4.0667, -3.82069, 3.08221, 0.1}};
+    int dark = pt_add_material(scene, pt_material_diffuse(pt_rgb_grey(PTI_R(0.1)))), i;
+    for (i = 0; i < 5; i++)
+        pt_add_sphere(scene, pt_v3((pt_real)lamp[i].x, (pt_real)lamp[i].y, (pt_real)lamp[i].z), (pt_real)lamp[i].r,
+                      pt_add_material(scene, pt_material_emitter(pt_rgb_grey((pt_real)lamp[i].emission))));
+    for (i = 0; i < 4; i++) {
+        pt_material m = pti_material_of_kind(PT_MATERIAL_CONDUCTOR, pt_rgb_grey(1));
+        m.eta = pt_rgb3(PTI_R(1.66), PTI_R(0.88), PTI_R(0.52));
+        m.k = pt_rgb3(PTI_R(9.22), PTI_R(6.27), PTI_R(4.84));
+        m.roughness = (pt_real)sqrt(plate[i][4]);
+        pt_add_parallelogram(scene, pt_v3(-4, (pt_real)plate[i][0], (pt_real)plate[i][1]), pt_v3(8, 0, 0),
+                             pt_v3(0, (pt_real)(plate[i][2] - plate[i][0]), (pt_real)(plate[i][3] - plate[i][1])), pt_add_material(scene, m));
+    }
+    pt_add_parallelogram(scene, pt_v3(-10, PTI_R(-4.14615), -10), pt_v3(0, 0, 30), pt_v3(20, 0, 0), dark);
+    pt_add_parallelogram(scene, pt_v3(-10, -10, -2), pt_v3(20, 0, 0), pt_v3(0, 20, 0), dark);
+    *camera = pt_camera_look_at(pt_v3(0, 6, PTI_R(27.5)), pt_v3(0, PTI_R(-1.5), PTI_R(2.5)), pt_v3(0, 1, 0), PTI_R(16.8));
+    return pt_commit(scene);
+}
+
+/* A room with a glossy floor, a mirror and a glass sphere; measures after I. Georgiev, SmallVCM, with y up. */
+PTDEF pt_result pt_scene_glossy_box(pt_scene *scene, pt_camera *camera)
+{
+    const pt_real x0 = PTI_R(-1.27029), x1 = PTI_R(1.28975), y0 = PTI_R(-1.28002), y1 = PTI_R(1.28002), z0 = PTI_R(-1.30455), z1 = PTI_R(1.25549);
+    const pt_real high = PTI_R(0.803922), low = PTI_R(0.156863), lamp_y = PTI_R(1.26002), q = PTI_R(0.25);
+    pt_material m = pti_material_of_kind(PT_MATERIAL_PHONG, pt_rgb_grey(PTI_R(0.1)));
+    int white = pt_add_material(scene, pt_material_diffuse(pt_rgb_grey(high))), glossy;
+    m.specular = pt_rgb_grey(PTI_R(0.7));
+    m.exponent = 90;
+    glossy = pt_add_material(scene, m);
+    pt_add_parallelogram(scene, pt_v3(x0, y0, z0), pt_v3(0, 0, z1 - z0), pt_v3(x1 - x0, 0, 0), glossy);
+    pt_add_parallelogram(scene, pt_v3(x0, y1, z0), pt_v3(x1 - x0, 0, 0), pt_v3(0, 0, z1 - z0), white);
+    pt_add_parallelogram(scene, pt_v3(x0, y0, z0), pt_v3(x1 - x0, 0, 0), pt_v3(0, y1 - y0, 0),
+                         pt_add_material(scene, pt_material_diffuse(pt_rgb3(low, PTI_R(0.172549), high))));
+    pt_add_parallelogram(scene, pt_v3(x0, y0, z0), pt_v3(0, y1 - y0, 0), pt_v3(0, 0, z1 - z0),
+                         pt_add_material(scene, pt_material_diffuse(pt_rgb3(low, high, PTI_R(0.172549)))));
+    pt_add_parallelogram(scene, pt_v3(x1, y0, z0), pt_v3(0, 0, z1 - z0), pt_v3(0, y1 - y0, 0),
+                         pt_add_material(scene, pt_material_diffuse(pt_rgb3(high, PTI_R(0.152941), PTI_R(0.152941)))));
+    pt_add_sphere(scene, pt_v3(PTI_R(-0.53885), y0 + PTI_R(0.5), PTI_R(-0.02453)), PTI_R(0.5), pt_add_material(scene, pt_material_mirror(pt_rgb_grey(1))));
+    pt_add_sphere(scene, pt_v3(PTI_R(0.55831), y0 + PTI_R(0.5), PTI_R(-0.02453)), PTI_R(0.5), pt_add_material(scene, pt_material_dielectric(PTI_R(1.6))));
+    pt_add_parallelogram(scene, pt_v3(-q, lamp_y, -q), pt_v3(2 * q, 0, 0), pt_v3(0, 0, 2 * q), /* normal down */
+                         pt_add_material(scene, pt_material_emitter(pt_rgb_grey(PTI_R(25.0333)))));
+    *camera = pt_camera_look_at(pt_v3(PTI_R(-0.0439815), PTI_R(0.222539), PTI_R(4.12529)),
+                                pt_v3(PTI_R(-0.0370953), PTI_R(0.1683229), PTI_R(3.126785)), pt_v3(0, 1, 0), 45);
+    return pt_commit(scene);
+}
+
+/* The caustic of a ring that mirrors inside: light from far away forms a nephroid on the floor, its cusp half a
+   radius from the axis. The lamp is a sphere 8 away, 7 degrees wide, so that paths from the eye can hit it. */
+PTDEF pt_result pt_scene_caustic_ring(pt_scene *scene, pt_camera *camera)
+{
+    enum { SEGMENTS = 512 };
+    pt_vec3 position[2 * SEGMENTS], normal[2 * SEGMENTS];
+    uint32_t index[6 * SEGMENTS], i;
+    int mirror = pt_add_material(scene, pt_material_mirror(pt_rgb_grey(PTI_R(0.95))));
+    int floor_material = pt_add_material(scene, pt_material_diffuse(pt_rgb_grey(PTI_R(0.7))));
+    for (i = 0; i < SEGMENTS; i++) {
+        double phi = 2 * PT_PI * i / SEGMENTS;
+        uint32_t a = 2 * i, b = 2 * ((i + 1) % SEGMENTS), *t = index + 6 * i;
+        position[a] = pt_v3((pt_real)cos(phi), 0, (pt_real)sin(phi));
+        position[a + 1] = pt_v3(position[a].x, PTI_R(0.4), position[a].z);
+        normal[a] = normal[a + 1] = pt_v3(-position[a].x, 0, -position[a].z);
+        t[0] = a; t[1] = b; t[2] = a + 1;
+        t[3] = b; t[4] = b + 1; t[5] = a + 1;
+    }
+    pt_add_mesh(scene, position, normal, NULL, 2 * SEGMENTS, index, 2 * SEGMENTS, mirror);
+    pt_add_parallelogram(scene, pt_v3(-3, 0, -3), pt_v3(0, 0, 6), pt_v3(6, 0, 0), floor_material);
+    pt_add_sphere(scene, pt_v3(PTI_R(-7.15542), PTI_R(3.57771), 0), PTI_R(0.5), pt_add_material(scene, pt_material_emitter(pt_rgb_grey(250))));
+    *camera = pt_camera_look_at(pt_v3(0, PTI_R(3.4), PTI_R(2.2)), pt_v3(0, 0, PTI_R(0.1)), pt_v3(0, 1, 0), 40);
+    return pt_commit(scene);
+}
+
+#if PTI_HAS_ENVIRONMENT
+/* Water (index 1.33) one deep over a diffuse floor (albedo 1/2) under a sky of radiance 1; side walls that mirror
+   make it endless. Seen at an angle of incidence with Fresnel reflectance F the radiance is exactly
+   F + (1-F)/n^2 albedo (1 - Rd) / (1 - albedo Rd'), Rd and Rd' the diffuse reflectances from above and below. */
+PTDEF pt_result pt_scene_pool(pt_scene *scene, pt_camera *camera)
+{
+    int bottom = pt_add_material(scene, pt_material_diffuse(pt_rgb_grey(PTI_R(0.5))));
+    int water = pt_add_material(scene, pt_material_dielectric(PTI_R(1.33)));
+    int wall = pt_add_material(scene, pt_material_mirror(pt_rgb_grey(1)));
+    pt_add_parallelogram(scene, pt_v3(-2, -1, -2), pt_v3(0, 0, 4), pt_v3(4, 0, 0), bottom);
+    pt_add_parallelogram(scene, pt_v3(-2, 0, -2), pt_v3(0, 0, 4), pt_v3(4, 0, 0), water);
+    pt_add_parallelogram(scene, pt_v3(-2, -1, -2), pt_v3(4, 0, 0), pt_v3(0, 1, 0), wall);
+    pt_add_parallelogram(scene, pt_v3(-2, -1, 2), pt_v3(4, 0, 0), pt_v3(0, 1, 0), wall);
+    pt_add_parallelogram(scene, pt_v3(-2, -1, -2), pt_v3(0, 0, 4), pt_v3(0, 1, 0), wall);
+    pt_add_parallelogram(scene, pt_v3(2, -1, -2), pt_v3(0, 0, 4), pt_v3(0, 1, 0), wall);
+    pt_set_environment(scene, pt_rgb_grey(1));
+    *camera = pt_camera_look_at(pt_v3(0, PTI_R(0.5), PTI_R(1.9)), pt_v3(0, 0, PTI_R(0.6)), pt_v3(0, 1, 0), 50);
+    return pt_commit(scene);
+}
+
+#if PTI_HAS_TEXTURES
+/* Every material as a sphere, on a checkered floor under a sky with a sun. */
+PTDEF pt_result pt_scene_materials(pt_scene *scene, pt_camera *camera)
+{
+    enum { WIDTH = 64, HEIGHT = 32, COUNT = 10 };
+    static const pt_texture checker = {PT_TEXTURE_CHECKER, NULL, 0, 0, {80, 80}, {PTI_R(0.25), PTI_R(0.25), PTI_R(0.25)},
+                                       {PTI_R(0.75), PTI_R(0.75), PTI_R(0.75)}, NULL, NULL};
+    static const double gold[6] = {0.143, 0.374, 1.442, 3.983, 2.386, 1.603};
+    static const struct {
+        pt_material_kind kind;
+        double roughness, specular, exponent;
+        double colour[3];
+    } list[COUNT] = {{PT_MATERIAL_DIFFUSE, 0, 0, 0, {0.6, 0.15, 0.1}},       {PT_MATERIAL_OREN_NAYAR, 0.6, 0, 0, {0.6, 0.15, 0.1}},
+                     {PT_MATERIAL_PHONG, 0, 0.4, 60, {0.1, 0.25, 0.5}},      {PT_MATERIAL_BLINN, 0, 0.4, 240, {0.1, 0.25, 0.5}},
+                     {PT_MATERIAL_COAT, 0, 0, 0, {0.05, 0.4, 0.15}},         {PT_MATERIAL_MIRROR, 0, 0, 0, {0.95, 0.95, 0.95}},
+                     {PT_MATERIAL_CONDUCTOR, 0.15, 0, 0, {1, 1, 1}},         {PT_MATERIAL_CONDUCTOR, 0.55, 0, 0, {1, 1, 1}},
+                     {PT_MATERIAL_DIELECTRIC, 0, 0, 0, {0, 0, 0}},           {PT_MATERIAL_DIELECTRIC, 0.4, 0, 0, {0, 0, 0}}};
+    float sky[3 * WIDTH * HEIGHT];
+    pt_material floor_material = pt_material_diffuse(pt_rgb_grey(1));
+    int x, y, i;
+    for (y = 0; y < HEIGHT; y++)
+        for (x = 0; x < WIDTH; x++) {
+            float *c = sky + 3 * (y * WIDTH + x), up = (float)(HEIGHT - 2 * y) / HEIGHT;
+            c[0] = up > 0 ? 0.5f + 0.1f * (1 - up) : 0.15f;
+            c[1] = up > 0 ? 0.65f + 0.1f * (1 - up) : 0.14f;
+            c[2] = up > 0 ? 0.95f : 0.12f;
+            if (y >= 7 && y <= 9 && x >= 12 && x <= 15) c[0] = c[1] = c[2] = 20; /* a hazy sun to the left behind the camera */
+        }
+    pt_set_environment_image(scene, sky, WIDTH, HEIGHT, 1);
+    floor_material.texture = &checker;
+    pt_add_parallelogram(scene, pt_v3(-40, 0, -60), pt_v3(0, 0, 80), pt_v3(80, 0, 0), pt_add_material(scene, floor_material));
+    for (i = 0; i < COUNT; i++) {
+        pt_material m = pti_material_of_kind(list[i].kind, pt_rgb3((pt_real)list[i].colour[0], (pt_real)list[i].colour[1], (pt_real)list[i].colour[2]));
+        m.roughness = (pt_real)list[i].roughness;
+        m.specular = pt_rgb_grey((pt_real)list[i].specular);
+        m.exponent = (pt_real)list[i].exponent;
+        m.ior = PTI_R(1.5);
+        m.eta = pt_rgb3((pt_real)gold[0], (pt_real)gold[1], (pt_real)gold[2]);
+        m.k = pt_rgb3((pt_real)gold[3], (pt_real)gold[4], (pt_real)gold[5]);
+        pt_add_sphere(scene, pt_v3((pt_real)(1.15 * (i % 5 - 2)), PTI_R(0.5), (pt_real)(1.3 * (i / 5) - 0.4)), PTI_R(0.5), pt_add_material(scene, m));
+    }
+    *camera = pt_camera_look_at(pt_v3(0, PTI_R(3.2), PTI_R(6.5)), pt_v3(0, PTI_R(0.35), PTI_R(0.1)), pt_v3(0, 1, 0), 40);
+    return pt_commit(scene);
+}
+#endif
+#endif
 
 PTDEF const pt_scene_entry *pt_scenes(int *count)
 {
@@ -6875,6 +9386,15 @@ PTDEF const pt_scene_entry *pt_scenes(int *count)
         {"diffuse-sphere", "point light in a diffuse sphere: uniform indirect light", pt_scene_diffuse_sphere},
         {"glass-ball", "caustic of a glass ball under a small lamp", pt_scene_glass_ball},
         {"smallpt", "smallpt's box: walls are spheres of radius 1e5", pt_scene_smallpt},
+        {"veach-plates", "four lamps in four plates: light sampling, BSDF sampling, both", pt_scene_veach_plates},
+        {"glossy-box", "glossy floor, mirror and glass; caustics found by hitting the lamp only", pt_scene_glossy_box},
+        {"caustic-ring", "nephroid in a mirror ring; found by hitting the lamp only", pt_scene_caustic_ring},
+#if PTI_HAS_ENVIRONMENT
+        {"pool", "water over a diffuse floor under a uniform sky: exact at every angle", pt_scene_pool},
+#if PTI_HAS_TEXTURES
+        {"materials", "every material under a sky with a sun", pt_scene_materials},
+#endif
+#endif
     };
     *count = (int)(sizeof scenes / sizeof scenes[0]);
     return scenes;

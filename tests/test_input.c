@@ -832,10 +832,10 @@ static void bad_light_indices(void)
     pt_commit(&s);
     for (i = 0; i < 4; i++)
         pt_check(!pt_light_sample(&s, index[i], v3(0, 0, 5), pt_v2(0, 0), &sample) &&
-                     pt_light_pdf_w(&s, index[i], v3(0, 0, 5), NULL) == 0 &&
+                     pt_light_pdf_w(&s, index[i], v3(0, 0, 5), v3(0, 0, 1), NULL) == 0 &&
                      !pt_light_sample_le(&s, index[i], pt_v2(0, 0), pt_v2(0, 0), 0, &emission),
                  label("light %d", index[i]), "exists");
-    pt_check(pt_light_pdf_w(&s, 0, v3(0, 0, 5), NULL) == 0, "a lamp as environment", "has a density");
+    pt_check(pt_light_pdf_w(&s, 0, v3(0, 0, 5), v3(0, 0, 1), NULL) == 0, "a lamp as environment", "has a density");
     pt_scene_free(&s);
 }
 

@@ -799,7 +799,7 @@ static void one_light(const light_case *l, uint64_t seed)
         else {
             const pt_rgb emitted = pt_hit_emission(&scene, &hit, pt_v3_neg(s.wi));
             pdf_off +=
-                pt_light_pdf_w(&scene, 0, o, &hit) != s.pdf_w || hit.light != 0 || emitted.b != s.radiance.b;
+                pt_light_pdf_w(&scene, 0, o, ray.d, &hit) != s.pdf_w || hit.light != 0 || emitted.b != s.radiance.b;
         }
     }
     pt_check(none == 0, l->name, "%d of %u not sampled", none, n);
@@ -837,7 +837,7 @@ static void light_densities(void)
                 pt_spawn_ray(pt_v3(0, 0, 0), pt_v3(0, 0, 0), pt_v3(0, 0, 0), pt_warp_sphere(pair(&rng)));
             pt_hit hit;
             const int found = pt_intersect(&scene, &ray, &hit);
-            pt_stats_add(&s, found ? pt_light_pdf_w(&scene, 0, ray.o, &hit) * 4 * PT_PI : 0);
+            pt_stats_add(&s, found ? pt_light_pdf_w(&scene, 0, ray.o, ray.d, &hit) * 4 * PT_PI : 0);
         }
         pt_check_mean(l->name, &s, 1, 1e-6, 0.25, PT_TEST_VALUES,
                       "the density of light sampling does not integrate to 1");
@@ -866,7 +866,7 @@ static void backs_are_dark(void)
         pt_check(pt_intersect(&scene, &ray, &hit), l->name, "its back cannot be hit");
         pt_check(dbl(pt_hit_emission(&scene, &hit, pt_v3_neg(pt_v3_normalize(ray.d))).r) == 0, l->name,
                  "its back shines");
-        pt_check(pt_light_pdf_w(&scene, 0, o, &hit) == 0, l->name, "its back has a density");
+        pt_check(pt_light_pdf_w(&scene, 0, o, ray.d, &hit) == 0, l->name, "its back has a density");
         pt_scene_free(&scene);
     }
 }
@@ -941,8 +941,8 @@ static void point_and_environment(void)
              "point light", "has no normal");
     pt_check(!pt_light_sample(&scene, 1 - environment, pt_v3(1, 5, -1), pt_v2(0, 0), &s), "point light",
              "lights its own position");
-    pt_check(pt_light_pdf_w(&scene, environment, p, NULL) == dbl(pt_warp_sphere_pdf_w()) &&
-                 pt_light_pdf_w(&scene, 1 - environment, p, NULL) == 0,
+    pt_check(pt_light_pdf_w(&scene, environment, p, v3(0, 1, 0), NULL) == dbl(pt_warp_sphere_pdf_w()) &&
+                 pt_light_pdf_w(&scene, 1 - environment, p, v3(0, 1, 0), NULL) == 0,
              "environment", "density of a ray that leaves");
     for (i = 0; i < (int)n; i++) {
         wrong += !pt_light_sample(&scene, environment, p, pair(&rng), &s) || s.delta ||

@@ -1769,7 +1769,7 @@ static weighted bsdf_by_hand(const pt_scene *scene, const pt_hit *hit, const pt_
     if (!pt_intersect(scene, &ray, &far_hit) || far_hit.light < 0) return result;
     result.value = (double)next.weight.g * (double)pt_hit_emission(scene, &far_hit, pt_v3_neg(next.wi)).g;
     result.weight = pt_mis_weight((double)next.pdf_w,
-                                  (double)pt_light_pdf_w(scene, far_hit.light, hit->p, &far_hit) *
+                                  (double)pt_light_pdf_w(scene, far_hit.light, hit->p, next.wi, &far_hit) *
                                       scene->lights[far_hit.light].pmf,
                                   PT_HEURISTIC_POWER);
     return result;
