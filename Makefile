@@ -32,9 +32,11 @@ SHARES = $(shell k=1; while [ $$k -le $(JOBS) ]; do echo $$k; k=$$((k + 1)); don
 TESTS = $(patsubst tests/%.c,%,$(wildcard tests/test_*.c))
 SCRIPTS = docs sections switches
 TEST_LOGS = $(SCRIPTS:%=build/test/check_%.log) $(TESTS:%=build/test/%.log)
-EXAMPLES = minimal render own_threads two_files cpp_user
+EXAMPLES = minimal render scenes own_threads two_files cpp_user
+# Samples per pixel of the contact sheet.
+SHEET_SPP = 128
 
-.PHONY: all test test-long test-logs examples bench mutants clean help FORCE
+.PHONY: all scenes test test-long test-logs examples bench mutants clean help FORCE
 # A program that was built only half is no program.
 .DELETE_ON_ERROR:
 
@@ -44,6 +46,7 @@ all: build/render
 
 help:
 	@echo 'make            render the Cornell box to build/cornell.ppm and .png; error against run time on stdout'
+	@echo 'make scenes     all scenes, bounces, methods and classes of light paths in build/scenes.png'
 	@echo 'make test       all checks; ends with a line "N passed, N failed"'
 	@echo 'make test-long  the same with the checks that need more samples'
 	@echo 'make examples   build and run the programs of examples/'
@@ -72,6 +75,7 @@ examples: $(EXAMPLES:%=build/examples/%)
 	    echo "== $$e"; \
 	    case $$e in \
 	    render) set -- ./render cornell-spheres --size 64x64 --spp 16 --progress off -o render.png ;; \
+	    scenes) set -- ./scenes 1 ;; \
 	    *) set -- ./$$e ;; \
 	    esac; \
 	    if [ -s $$e ]; then "$$@" || exit 1; else echo 'skipped: no C++ compiler'; fi; \
@@ -80,6 +84,13 @@ examples: $(EXAMPLES:%=build/examples/%)
 build/examples/minimal: examples/minimal.c pathtracer.h build/flags
 	@mkdir -p build/examples
 	$(BUILD_C) examples/minimal.c -o $@ $(LDLIBS)
+
+build/examples/scenes: examples/scenes.c pathtracer.h build/flags
+	@mkdir -p build/examples
+	$(BUILD_C) examples/scenes.c -o $@ $(LDLIBS)
+
+scenes: build/examples/scenes
+	build/examples/scenes $(SHEET_SPP) build/scenes.png
 
 build/examples/render: build/render
 	@mkdir -p build/examples

@@ -1,4 +1,4 @@
-/* pathtracer.h - v0.1.0 - a path tracer in one C99 header: render by the rendering equation,
+/* pathtracer.h - v0.2.0 - a path tracer in one C99 header: render by the rendering equation,
    know how wrong the picture still is, and how long that took.      MIT-0 or public domain, see the end.
 
    Do this in exactly ONE C or C++ file, and include the header plainly everywhere else:
@@ -169,9 +169,9 @@
    ===================================================================================================== */
 
 #define PT_VERSION_MAJOR 0
-#define PT_VERSION_MINOR 1
+#define PT_VERSION_MINOR 2
 #define PT_VERSION_PATCH 0
-#define PT_VERSION_STRING "0.1.0"
+#define PT_VERSION_STRING "0.2.0"
 
 #if (defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ > 0) || \
      defined(__ASSOCIATIVE_MATH__) || defined(__RECIPROCAL_MATH__) || defined(_M_FP_FAST)) && \
@@ -9420,6 +9420,11 @@ PTDEF const pt_scene_entry *pt_scene_find(const char *name)
 /*
    VERSION HISTORY
 
+   0.2.0 (2026-11-22)  what the lecture names up to importance sampling: GGX metal and glass, measured eta and k,
+                       Phong, Blinn-Phong, Oren-Nayar, coat, MERL tables and a virtual gonioreflectometer, textures;
+                       spot, parallel and image environment light; pixel filters; local, Whitted, distribution and
+                       branching methods; light-path expressions; five more scenes. pt_light_pdf_w takes the
+                       direction; pt_point_light is pt_delta_light.
    0.1.0 (2026-11-22)  first version: path tracing (plain, light sampling, MIS) of diffuse, mirror and glass
                        surfaces under area, point and constant environment lights; four samplers; error
                        against run time in every report; Cornell box and six more scenes.
