@@ -787,6 +787,7 @@ typedef enum pt_shape { PT_SHAPE_TRIANGLE = 0, PT_SHAPE_PARALLELOGRAM, PT_SHAPE_
 typedef struct pt_hit {
     pt_real t;
     pt_vec3 p, p_error;  /* the point, and a bound of its rounding error per coordinate                    */
+    pt_vec3 p_low, p_low_error; /* what rounding took from p (0 with PT_DOUBLE), and the error of p + p_low */
     pt_vec3 ng, ns;      /* unit geometric and shading normal, the second on the side of the first         */
     pt_vec2 uv;          /* texture coordinates; barycentric or edge weights where a mesh has none         */
     pt_real u, v;        /* position within the primitive: weights of corners 2 and 3, of edge 1 and 2     */
@@ -3568,18 +3569,22 @@ typedef struct pti_ray {
     int kx, ky, kz;         /* the axes, z the longest of d                                                */
     double sx, sy, sz;      /* shear and scale that take d to (0,0,1)                                      */
     double end;             /* tmax: what may lie at it, or beyond it by rounding, is not hit              */
-    pt_real origin[3], inverse[3]; /* for boxes; 1/0 = infinity                                            */
+    pt_real origin[3], inverse[3]; /* for boxes: o and 1/d, rounded; 1/0 = infinity                        */
 } pti_ray;
 
-static pti_ray pti_ray_make(const pt_ray *ray)
+/* From an origin and a direction in double. Paths carry the origin with the digits that pt_real loses: far from the
+   coordinate origin a rounded hit point would lie behind the neighbouring wall of an edge. */
+static pti_ray pti_ray_from(pti_d3 o, pti_d3 d, double end)
 {
     pti_ray r;
     int k;
-    r.end = ray->tmax < PTI_REAL_MAX ? (double)ray->tmax : HUGE_VAL;
-    r.origin[0] = ray->o.x; r.origin[1] = ray->o.y; r.origin[2] = ray->o.z;
-    r.inverse[0] = 1 / ray->d.x; r.inverse[1] = 1 / ray->d.y; r.inverse[2] = 1 / ray->d.z;
-    r.o[0] = (double)ray->o.x; r.o[1] = (double)ray->o.y; r.o[2] = (double)ray->o.z;
-    r.d[0] = (double)ray->d.x; r.d[1] = (double)ray->d.y; r.d[2] = (double)ray->d.z;
+    r.end = end;
+    r.o[0] = o.x; r.o[1] = o.y; r.o[2] = o.z;
+    r.d[0] = d.x; r.d[1] = d.y; r.d[2] = d.z;
+    for (k = 0; k < 3; k++) {
+        r.origin[k] = (pt_real)r.o[k];
+        r.inverse[k] = 1 / (pt_real)r.d[k];
+    }
     r.kz = fabs(r.d[0]) > fabs(r.d[1]) ? 0 : 1;
     if (fabs(r.d[2]) > fabs(r.d[r.kz])) r.kz = 2;
     r.kx = r.kz == 2 ? 0 : r.kz + 1;
@@ -3593,6 +3598,11 @@ static pti_ray pti_ray_make(const pt_ray *ray)
     r.sx = r.d[r.kx] * r.sz;
     r.sy = r.d[r.ky] * r.sz;
     return r;
+}
+
+static pti_ray pti_ray_make(const pt_ray *ray)
+{
+    return pti_ray_from(pti_d_from(ray->o), pti_d_from(ray->d), ray->tmax >= PTI_REAL_MAX ? HUGE_VAL : (double)ray->tmax); /* NaN stays */
 }
 
 /* a * b - c * d with the exact sign; swapping the two products negates the result exactly. */
@@ -3740,7 +3750,7 @@ PTDEF int pt_intersect_triangle(const pt_ray *ray, pt_vec3 v0, pt_vec3 v1, pt_ve
    both distances. *entry: where the box begins. */
 PTI_INLINE int pti_box(const pti_ray *r, pt_vec3 lo, pt_vec3 hi, pt_real tmax, pt_real *entry)
 {
-    const pt_real pad = PTI_R(1 + 7 * PTI_UNIT_ROUNDOFF); /* 1 + 2 gamma(3), rounded up */
+    const pt_real pad = PTI_R(1 + 9 * PTI_UNIT_ROUNDOFF); /* 1 + 2 gamma(4), rounded up: d, 1/d, -, * */
     pt_real t0 = 0, t1 = tmax, n, f;
     n = ((r->inverse[0] < 0 ? hi.x : lo.x) - r->origin[0]) * r->inverse[0];
     f = ((r->inverse[0] < 0 ? lo.x : hi.x) - r->origin[0]) * r->inverse[0] * pad;
@@ -3820,6 +3830,23 @@ PTDEF pt_ray pt_spawn_ray_to(pt_vec3 p, pt_vec3 p_error, pt_vec3 np, pt_vec3 q, 
     return ray;
 }
 
+/* The origin of a ray that leaves a hit into w, as pt_spawn_ray has it, but with all digits of the hit: moved along
+   ng by the error of p + p_low and of the sum below. */
+static pti_d3 pti_leave(const pt_hit *hit, pt_vec3 w)
+{
+    pti_d3 p = pti_d_add(pti_d_from(hit->p), pti_d_from(hit->p_low)), n = pti_d_from(hit->ng);
+    pti_d3 e = pti_d_add(pti_d_from(hit->p_low_error), pti_d_scale(pti_d(fabs(p.x), fabs(p.y), fabs(p.z)), 4 * PTI_2_M53));
+    double d = fabs(n.x) * e.x + fabs(n.y) * e.y + fabs(n.z) * e.z;
+    return pti_d_add(p, pti_d_scale(n, pt_v3_dot(hit->ng, w) < 0 ? -d : d));
+}
+
+/* The shadow ray from a hit towards a point of a light, both ends moved off their surfaces. */
+static pti_ray pti_shadow_ray(const pt_hit *hit, pt_vec3 w, pt_vec3 q, pt_vec3 q_error, pt_vec3 nq)
+{
+    pti_d3 o = pti_leave(hit, w);
+    return pti_ray_from(o, pti_d_sub(pti_d_from(pti_offset(q, q_error, nq, pt_v3_neg(w))), o), 1);
+}
+
 /* The corners of a flat primitive, and how many: a triangle has v[3] = v[2]. */
 PTI_INLINE int pti_corners(const pt_scene *scene, const pt_primitive *p, pt_vec3 v[4])
 {
@@ -3872,16 +3899,19 @@ PTI_INLINE pt_real pti_point_error(pt_real p, double m)
     return PTI_R(PTI_UNIT_ROUNDOFF) * pti_fabs(p) + (pt_real)(16 * PTI_2_M53 * m);
 }
 
+static pti_d3 pti_d_abs(pti_d3 a)
+{
+    return pti_d(fabs(a.x), fabs(a.y), fabs(a.z));
+}
+
 static void pti_set_point(pt_hit *hit, pti_d3 p, pti_d3 magnitude)
 {
     hit->p = pti_d_to(p);
     hit->p_error = pt_v3(pti_point_error(hit->p.x, magnitude.x), pti_point_error(hit->p.y, magnitude.y),
                          pti_point_error(hit->p.z, magnitude.z));
-}
-
-static pti_d3 pti_d_abs(pti_d3 a)
-{
-    return pti_d(fabs(a.x), fabs(a.y), fabs(a.z));
+    /* rounding the rest once more leaves an error of u^2 |p| */
+    hit->p_low = pti_d_to(pti_d_sub(p, pti_d_from(hit->p)));
+    hit->p_low_error = pti_d_to(pti_d_add(pti_d_scale(magnitude, 16 * PTI_2_M53), pti_d_scale(pti_d_abs(p), PTI_UNIT_ROUNDOFF * PTI_UNIT_ROUNDOFF)));
 }
 
 /* Position, error bound and normal of a triangle at weights b1, b2 of its corners 1 and 2. */
@@ -6196,6 +6226,17 @@ static int pti_commit_primitives(pt_scene *scene)
     return 1;
 }
 
+/* Widens a box by what rounding the origin of a ray that starts in the scene may move it: u times the largest
+   coordinate, and as much for each of the two roundings here. */
+static void pti_widen(pt_vec3 *lo, pt_vec3 *hi, const pti_bounds *all)
+{
+    pt_real e[3];
+    int k;
+    for (k = 0; k < 3; k++) e[k] = (pt_real)(3 * PTI_UNIT_ROUNDOFF * fmax(fabs(all->lo[k]), fabs(all->hi[k])));
+    *lo = pt_v3(lo->x - e[0], lo->y - e[1], lo->z - e[2]);
+    *hi = pt_v3(hi->x + e[0], hi->y + e[1], hi->z + e[2]);
+}
+
 /* Boxes, bounds and the tree. */
 static int pti_commit_tree(pt_scene *scene)
 {
@@ -6208,6 +6249,7 @@ static int pti_commit_tree(pt_scene *scene)
         pti_primitive_box(scene, &scene->primitives[i], &boxes[i], &boxes[n + i], &area);
         pti_bounds_add(&all, boxes[i], boxes[n + i]);
     }
+    for (i = 0; ok && i < n; i++) pti_widen(&boxes[i], &boxes[n + i], &all);
     if (n > 0) {
         scene->lo = pt_v3((pt_real)all.lo[0], (pt_real)all.lo[1], (pt_real)all.lo[2]);
         scene->hi = pt_v3((pt_real)all.hi[0], (pt_real)all.hi[1], (pt_real)all.hi[2]);
@@ -6394,20 +6436,30 @@ PTDEF void pt_scene_free(pt_scene *scene)
     scene->alloc_user = user;
 }
 
+static int pti_intersect(const pt_scene *scene, const pti_ray *r, pt_hit *hit)
+{
+    pti_best best;
+    if (!pti_search(scene, r, r->end >= (double)PTI_REAL_MAX ? (double)PTI_REAL_MAX : r->end, &best, 0)) return 0;
+    pti_fill(scene, r, &best, hit);
+    return 1;
+}
+
+static int pti_occluded(const pt_scene *scene, const pti_ray *r)
+{
+    pti_best best;
+    return pti_search(scene, r, r->end >= (double)PTI_REAL_MAX ? (double)PTI_REAL_MAX : r->end, &best, 1);
+}
+
 PTDEF int pt_intersect(const pt_scene *scene, const pt_ray *ray, pt_hit *hit)
 {
     pti_ray r = pti_ray_make(ray);
-    pti_best best;
-    if (!pti_search(scene, &r, (double)ray->tmax, &best, 0)) return 0;
-    pti_fill(scene, &r, &best, hit);
-    return 1;
+    return pti_intersect(scene, &r, hit);
 }
 
 PTDEF int pt_occluded(const pt_scene *scene, const pt_ray *ray)
 {
     pti_ray r = pti_ray_make(ray);
-    pti_best best;
-    return pti_search(scene, &r, (double)ray->tmax, &best, 1);
+    return pti_occluded(scene, &r);
 }
 
 /* --- camera --- */
@@ -7082,7 +7134,9 @@ typedef struct pti_walk {
     const pt_scene *scene;
     pt_sampler *sampler;
     const pt_li_options *options;
-    pt_ray ray;
+    pti_d3 o;               /* where the last edge starts,                                                 */
+    pt_vec3 d;              /*   and its direction (unit)                                                  */
+    pt_vec3 p;              /* o, rounded to the side of its surface that it is on: lights are seen from it */
     pt_hit hit;
     pt_rgbd beta;           /* throughput                                                                  */
     double eta2;            /* product of eta^2 over the refractions so far                                */
@@ -7164,8 +7218,16 @@ PTI_INLINE double pti_emission_weight(const pti_walk *w, int light, const pt_hit
     double p;
     if (technique == PTI_TECHNIQUE_PLAIN || w->specular) return 1;
     if (technique == PTI_TECHNIQUE_LIGHT) return 0;
-    p = w->scene->lights[light].pmf * pt_light_pdf_w(w->scene, light, w->ray.o, w->ray.d, hit);
+    p = w->scene->lights[light].pmf * pt_light_pdf_w(w->scene, light, w->p, w->d, hit);
     return pt_mis_weight((double)w->pdf_w, p, w->options->heuristic);
+}
+
+/* Is nothing between a hit and the sampled point of a light? */
+static int pti_reaches(const pt_scene *scene, const pt_hit *hit, const pt_light_sample_result *ls)
+{
+    pti_ray r = ls->infinite ? pti_ray_from(pti_leave(hit, ls->wi), pti_d_from(ls->wi), HUGE_VAL)
+                             : pti_shadow_ray(hit, ls->wi, ls->p, ls->p_error, ls->n);
+    return !pti_occluded(scene, &r);
 }
 
 /* Asks one point of one light for its light at the current vertex. */
@@ -7176,7 +7238,6 @@ PTI_INLINE void pti_direct(pti_walk *w, const pt_bsdf *bsdf, pt_vec3 wo, const u
     pt_real c;
     pt_vec2 u;
     pt_rgb f;
-    pt_ray shadow;
     double pmf, p, weight, diffuse_weight;
     int light;
     if ((features & PTI_WITH_SPECULAR) && !(bsdf->lobes & (PT_LOBE_DIFFUSE | PT_LOBE_GLOSSY))) return;
@@ -7188,11 +7249,8 @@ PTI_INLINE void pti_direct(pti_walk *w, const pt_bsdf *bsdf, pt_vec3 wo, const u
     if (!pt_light_sample(w->scene, light, pti_offset(w->hit.p, w->hit.p_error, w->hit.ng, wo), u, &ls)) return;
     f = pt_bsdf_eval(bsdf, wo, ls.wi, PT_RADIANCE, PT_LOBE_ALL);
     if (pti_rgb_black(f)) return;
-    if ((features & PTI_WITH_SPECULAR) && ls.infinite)
-        shadow = pt_spawn_ray(w->hit.p, w->hit.p_error, w->hit.ng, ls.wi);
-    else shadow = pt_spawn_ray_to(w->hit.p, w->hit.p_error, w->hit.ng, ls.p, ls.p_error, ls.n);
     w->rays++;
-    if (pt_occluded(w->scene, &shadow)) return;
+    if (!pti_reaches(w->scene, &w->hit, &ls)) return;
     c = pti_fabs(pt_v3_dot(ls.wi, bsdf->frame.n));
     p = pmf * ls.pdf_w;
     weight = technique >= PTI_TECHNIQUE_MIS && !ls.delta
@@ -7262,7 +7320,9 @@ PTI_INLINE int pti_extend(pti_walk *w, const pt_bsdf *bsdf, pt_vec3 wo, const un
     if (technique == PTI_TECHNIQUE_DISTRIBUTION) pti_drop_diffuse(w, bsdf, wo, &s);
 #endif
     (void)technique;
-    w->ray = pt_spawn_ray(w->hit.p, w->hit.p_error, w->hit.ng, s.wi);
+    w->o = pti_leave(&w->hit, s.wi);
+    w->p = pti_offset(w->hit.p, w->hit.p_error, w->hit.ng, s.wi);
+    w->d = s.wi;
     return w->beta.r > 0 || w->beta.g > 0 || w->beta.b > 0;
 }
 
@@ -7297,7 +7357,7 @@ static void pti_describe_first_hit(const pt_hit *hit, const pt_bsdf *bsdf, pt_li
 PTI_INLINE void pti_contribute_environment(pti_walk *w, const int technique, const unsigned features)
 {
 #if PTI_HAS_ENVIRONMENT
-    pt_rgb emission = pt_environment_radiance(w->scene, w->ray.d);
+    pt_rgb emission = pt_environment_radiance(w->scene, w->d);
     if (!pti_rgb_black(emission))
         pti_contribute(w, emission, pti_emission_weight(w, w->scene->environment_light, NULL, technique), w->edges, 0, features);
 #endif
@@ -7313,9 +7373,9 @@ PTI_INLINE pt_rgbd pti_path(const pt_scene *scene, const pt_ray *ray, pt_sampler
     w.scene = scene;
     w.sampler = sampler;
     w.options = options;
-    w.ray = *ray;
-    w.ray.d = pt_v3_normalize(ray->d); /* its negative is wo, whose cosines must be cosines */
-    w.ray.tmax = PTI_REAL_MAX;
+    w.o = pti_d_from(ray->o);
+    w.p = ray->o;
+    w.d = pt_v3_normalize(ray->d); /* its negative is wo, whose cosines must be cosines */
     w.beta = pt_rgbd3(1, 1, 1);
     w.eta2 = 1;
     w.sum = pt_rgbd3(0, 0, 0);
@@ -7332,11 +7392,12 @@ PTI_INLINE pt_rgbd pti_path(const pt_scene *scene, const pt_ray *ray, pt_sampler
     info->hit = 0;
     info->cancelled = 0;
     for (w.edges = 1;; w.edges++) {
-        pt_vec3 wo = pt_v3_neg(w.ray.d);
+        pti_ray edge = pti_ray_from(w.o, pti_d_from(w.d), HUGE_VAL);
+        pt_vec3 wo = pt_v3_neg(w.d);
         pt_rgb emission;
         pt_bsdf bsdf;
         w.rays++;
-        if (!pt_intersect(scene, &w.ray, &w.hit)) {
+        if (!pti_intersect(scene, &edge, &w.hit)) {
             if ((features & PTI_WITH_ENVIRONMENT) && scene->environment_light >= 0)
                 pti_contribute_environment(&w, technique, features);
             break;
@@ -7402,8 +7463,7 @@ PTDEF pt_rgbd pt_li_path_light(const pt_scene *scene, const pt_ray *ray, pt_samp
 /* Light from the middle of light k as if all of it came from there: irradiance across the direction; 0: none. */
 static int pti_middle_of_light(const pt_scene *scene, int k, const pt_hit *hit, pt_vec3 wo, pt_light_sample_result *ls)
 {
-    pt_vec3 p = pti_offset(hit->p, hit->p_error, hit->ng, wo);
-    if (!pt_light_sample(scene, k, p, pt_v2(PTI_R(0.5), PTI_R(0.5)), ls)) return 0;
+    if (!pt_light_sample(scene, k, pti_offset(hit->p, hit->p_error, hit->ng, wo), pt_v2(PTI_R(0.5), PTI_R(0.5)), ls)) return 0;
     ls->radiance = pt_rgb3((pt_real)((double)ls->radiance.r / ls->pdf_w), (pt_real)((double)ls->radiance.g / ls->pdf_w),
                            (pt_real)((double)ls->radiance.b / ls->pdf_w));
     return 1;
@@ -7416,29 +7476,43 @@ static void pti_add_product(pt_rgbd *sum, pt_rgbd beta, pt_rgb value, double k)
     sum->b += beta.b * (double)value.b * k;
 }
 
-/* A ray with a unit direction and no end: its first hit with BSDF and emission. 0: it left the scene, and
-   `emission` is the background's. */
-static int pti_look(const pt_scene *scene, const pt_ray *ray, pt_hit *hit, pt_bsdf *bsdf, pt_rgb *emission, pt_li_info *info)
+/* A ray of a tree: origin, direction (unit). */
+typedef struct pti_twig {
+    pti_d3 o;
+    pt_vec3 d;
+} pti_twig;
+
+static pti_twig pti_twig_from(const pt_hit *hit, pt_vec3 w)
 {
+    pti_twig t;
+    t.o = pti_leave(hit, w);
+    t.d = w;
+    return t;
+}
+
+/* Its first hit with BSDF and emission. 0: it left the scene, and `emission` is the background's. */
+static int pti_look(const pt_scene *scene, const pti_twig *twig, pt_hit *hit, pt_bsdf *bsdf, pt_rgb *emission, pt_li_info *info)
+{
+    pti_ray r = pti_ray_from(twig->o, pti_d_from(twig->d), HUGE_VAL);
     info->rays++;
     *emission = pt_rgb_grey(0);
-    if (!pt_intersect(scene, ray, hit)) {
+    if (!pti_intersect(scene, &r, hit)) {
 #if PTI_HAS_ENVIRONMENT
-        *emission = pt_environment_radiance(scene, ray->d);
+        *emission = pt_environment_radiance(scene, twig->d);
 #endif
         return 0;
     }
-    *emission = pt_hit_emission(scene, hit, pt_v3_neg(ray->d));
+    *emission = pt_hit_emission(scene, hit, pt_v3_neg(twig->d));
     *bsdf = pt_bsdf_make(&scene->materials[hit->material], hit);
     return 1;
 }
 
 /* What the methods below share at their start. */
-static pt_ray pti_first_ray(const pt_ray *ray, pt_li_info *info)
+static pti_twig pti_first_twig(const pt_ray *ray, pt_li_info *info)
 {
-    pt_ray r = *ray;
+    pti_twig r;
+    r.o = pti_d_from(ray->o);
     r.d = pt_v3_normalize(ray->d);
-    r.tmax = PTI_REAL_MAX;
     info->hit = info->cancelled = 0;
     info->edges = 1;
     return r;
@@ -7448,7 +7522,7 @@ PTDEF pt_rgbd pt_li_local(const pt_scene *scene, const pt_ray *ray, pt_sampler *
                           pt_li_info *info)
 {
     const pt_rgbd one = pt_rgbd3(1, 1, 1);
-    pt_ray r = pti_first_ray(ray, info);
+    pti_twig r = pti_first_twig(ray, info);
     pt_vec3 wo = pt_v3_neg(r.d), n;
     pt_light_sample_result ls;
     pt_rgb emission;
@@ -7476,7 +7550,7 @@ PTDEF pt_rgbd pt_li_local(const pt_scene *scene, const pt_ray *ray, pt_sampler *
 
 /* A ray of the tree that waits to be followed. */
 typedef struct pti_branch {
-    pt_ray ray;
+    pti_twig ray;
     pt_rgbd beta;
     int edges;
 } pti_branch;
@@ -7490,14 +7564,12 @@ static void pti_whitted_direct(const pt_scene *scene, const pti_branch *b, const
     pt_light_sample_result ls;
     uint32_t k;
     for (k = 0; k < scene->light_count; k++) {
-        pt_ray shadow;
         pt_rgb f;
-        if (!pti_middle_of_light(scene, (int)k, hit, wo, &ls)) continue;
+        if (scene->lights[k].kind == PT_LIGHT_ENVIRONMENT || !pti_middle_of_light(scene, (int)k, hit, wo, &ls)) continue;
         f = pt_bsdf_eval(bsdf, wo, ls.wi, PT_RADIANCE, PT_LOBE_ALL);
         if (pti_rgb_black(f)) continue;
-        shadow = ls.infinite ? pt_spawn_ray(hit->p, hit->p_error, hit->ng, ls.wi) : pt_spawn_ray_to(hit->p, hit->p_error, hit->ng, ls.p, ls.p_error, ls.n);
         info->rays++;
-        if (pt_occluded(scene, &shadow)) continue;
+        if (!pti_reaches(scene, hit, &ls)) continue;
         pti_add_product(sum, b->beta, pt_rgb_mul(f, ls.radiance), fabs((double)pt_v3_dot(ls.wi, bsdf->frame.n)));
     }
 }
@@ -7514,7 +7586,7 @@ static int pti_whitted_branch(const pti_branch *b, const pt_hit *hit, const pt_b
         if (s.lobe != PT_LOBE_SPECULAR || !(s.pdf_w > 0)) continue;
         stack[n].beta = pt_rgbd3(0, 0, 0);
         pti_add_product(&stack[n].beta, b->beta, s.weight, (double)s.pdf_w);
-        stack[n].ray = pt_spawn_ray(hit->p, hit->p_error, hit->ng, s.wi);
+        stack[n].ray = pti_twig_from(hit, s.wi);
         stack[n++].edges = b->edges + 1;
         if (s.pdf_w >= 1) break; /* nothing is left for the other */
     }
@@ -7529,7 +7601,7 @@ PTDEF pt_rgbd pt_li_whitted(const pt_scene *scene, const pt_ray *ray, pt_sampler
     int most = options->max_edges > 0 ? options->max_edges : PTI_TREE_EDGES, top = 1;
     (void)sampler;
     if (most > PTI_TREE_MOST) most = PTI_TREE_MOST;
-    stack[0].ray = pti_first_ray(ray, info);
+    stack[0].ray = pti_first_twig(ray, info);
     stack[0].beta = pt_rgbd3(1, 1, 1);
     stack[0].edges = 1;
     while (top > 0) {
@@ -7572,7 +7644,7 @@ typedef struct pti_solver {
 } pti_solver;
 
 /* L(ray) = Le + 1/N sum of f cos / p L(next): the equation itself. The depth is at most PTI_TREE_MOST. */
-static pt_rgbd pti_solve(pti_solver *s, const pt_ray *ray, int edges)
+static pt_rgbd pti_solve(pti_solver *s, const pti_twig *ray, int edges)
 {
     pt_rgbd sum = pt_rgbd3(0, 0, 0);
     pt_rgb emission;
@@ -7585,11 +7657,11 @@ static pt_rgbd pti_solve(pti_solver *s, const pt_ray *ray, int edges)
     if (edges > s->info->edges) s->info->edges = edges;
     for (k = 0; k < s->branching && edges < s->most && !s->info->cancelled; k++) {
         pt_bsdf_sample_result b;
-        pt_ray next;
+        pti_twig next;
         pt_vec2 u = pti_pcg32_pair(&s->random);
         if ((s->info->rays & 0xffff) == 0 && s->options->poll && s->options->poll(s->options->poll_user)) s->info->cancelled = 1;
         if (!pt_bsdf_sample(&bsdf, pt_v3_neg(ray->d), pt_pcg32_double(&s->random), u, PT_RADIANCE, &b)) continue;
-        next = pt_spawn_ray(hit.p, hit.p_error, hit.ng, b.wi);
+        next = pti_twig_from(&hit, b.wi);
         pti_add_product(&sum, pti_solve(s, &next, edges + 1), b.weight, 1.0 / s->branching);
     }
     return sum;
@@ -7598,7 +7670,7 @@ static pt_rgbd pti_solve(pti_solver *s, const pt_ray *ray, int edges)
 PTDEF pt_rgbd pt_li_branching(const pt_scene *scene, const pt_ray *ray, pt_sampler *sampler,
                               const pt_li_options *options, pt_li_info *info)
 {
-    pt_ray r = pti_first_ray(ray, info);
+    pti_twig r = pti_first_twig(ray, info);
     pti_solver s;
     s.scene = scene;
     s.options = options;
