@@ -5350,7 +5350,7 @@ static int pti_sample_flat(const pt_scene *scene, const pt_primitive *primitive,
     pti_d3 w, q, o = pti_d_from(p), size;
     double t;
     if (!pti_flat_make(&f, scene, primitive, p)) return 0;
-    w = pti_flat_direction(&f, (double)u.x, (double)u.y);
+    w = pti_d_normalize(pti_flat_direction(&f, (double)u.x, (double)u.y)); /* nearly edge-on it loses digits */
     t = pti_d_dot(f.corner, f.n) / pti_d_dot(w, f.n);
     if (!(t > 0) || !pti_finite(t)) return 0;
     q = pti_d_add(o, pti_d_scale(w, t));
