@@ -48,7 +48,7 @@ help:
 	@echo 'make test-long  the same with the checks that need more samples'
 	@echo 'make examples   build and run the programs of examples/'
 	@echo 'make bench      rays per second, compile time, what leaving out saves; CSV on stdout'
-	@echo 'make mutants    break the header in known ways; every broken copy must fail a check'
+	@echo 'make mutants    break the header, one change at a time; every broken copy must fail a check; GENERATED=n ALL=1'
 	@echo 'make clean      remove build/'
 	@echo 'variables       CC CFLAGS LDFLAGS EXTRA JOBS; SHORT=1 SEED=n for the tests; SCENE SIZE SPP for plain make'
 
@@ -137,11 +137,13 @@ build/mutants/run: tests/mutants.c build/flags
 	@mkdir -p build/mutants
 	$(BUILD_C) tests/mutants.c -o $@
 
-# JOBS shares of the list at a time. ONLY=name takes one mutant.
+# JOBS shares at a time. GENERATED=n draws n changes that nobody chose, ALL=1 tries also those that are listed
+# as no error, ONLY=name takes one mutant.
+GENERATED ?= 200
 mutants: build/mutants/run
 	@rm -f build/mutants/share*.log
 	@for k in $(if $(ONLY),1,$(SHARES)); do \
 	    CC='$(CC)' sh tests/run.sh one build/mutants/share$$k.log build/mutants/run \
-	        $(if $(ONLY),--only $(ONLY),--share $$k/$(JOBS)) $(TESTS) & \
+	        $(if $(ONLY),--only $(ONLY),--share $$k/$(JOBS)) --generate $(GENERATED) $(if $(ALL),--all) $(TESTS) & \
 	done; wait
 	@sh tests/run.sh sum build/mutants/share*.log
