@@ -871,6 +871,9 @@ static void endless_paths(void)
     pt_film film = PT_FILM_INIT;
     pt_report r = PT_REPORT_INIT;
     pt_material white = pt_material_diffuse(grey(1));
+    pt_sampler sampler = pt_sampler_make(PT_SAMPLER_INDEPENDENT, 1, 0);
+    const pt_ray ray = {{0, 0, 0}, {0, 0, -1}, 1};
+    pt_li_info info;
     pt_result result;
     int polls = 0;
     memset(&s, 0, sizeof s);
@@ -885,6 +888,11 @@ static void endless_paths(void)
     result = pt_render(&s.scene, &d, &film, &r);
     pt_check(result == PT_ERROR_CANCELLED && polls >= 3 && pt_film_spp(&film) == 0, "polled inside a path",
              "%s after %d polls, %u samples", pt_result_string(result), polls, (unsigned)pt_film_spp(&film));
+    memset(&info, 0, sizeof info);
+    polls = 0;
+    pt_li_path(&s.scene, &ray, &sampler, &d.li, &info);
+    pt_check(info.cancelled && polls == 3 && info.edges == 3 << 16, "a path that is cancelled says so",
+             "cancelled %d after %d polls and %d edges", info.cancelled, polls, info.edges);
     d.li.poll = NULL;
     d.seconds = 0.2;
     result = pt_render(&s.scene, &d, &film, &r);

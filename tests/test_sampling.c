@@ -538,6 +538,26 @@ static void black_and_mirror(void)
     }
 }
 
+/* A direction in the plane of the surface itself is on neither side: nothing is reflected to it or from it. */
+static void edge_on(void)
+{
+    const pt_material mirror = pt_material_mirror(pt_rgb_grey(1)), white = pt_material_diffuse(pt_rgb_grey(1)),
+                      air = pt_material_dielectric(1);
+    const pt_vec3 up = pt_v3(0, 0, 1), along = pt_v3(1, 0, 0), leaning = pt_v3_normalize(pt_v3(1, 0, 2));
+    const pt_hit flat = hit_of(up, up), bent = hit_of(up, leaning);
+    pt_bsdf b = pt_bsdf_make(&mirror, &flat);
+    pt_bsdf_sample_result s;
+    pt_check(!pt_bsdf_sample(&b, along, 0.5, pt_v2(0, 0), PT_RADIANCE, &s), "a mirror seen edge-on", "reflects");
+    b = pt_bsdf_make(&white, &bent);
+    pt_check(dbl(pt_bsdf_pdf_w(&b, up, leaning, PT_RADIANCE)) > 0 &&
+                 dbl(pt_bsdf_eval(&b, up, along, PT_RADIANCE, PT_LOBE_ALL).r) == 0 &&
+                 dbl(pt_bsdf_pdf_w(&b, up, along, PT_RADIANCE)) == 0,
+             "a light in the plane of a surface", "lights it, as the shading normal leans to it");
+    b = pt_bsdf_make(&air, &flat);
+    pt_check(pt_bsdf_sample(&b, up, 0, pt_v2(0, 0), PT_RADIANCE, &s) && dbl(s.wi.z) < 0 && dbl(s.pdf_w) == 1,
+             "ior 1", "reflects, for u_lobe 0, with probability 0");
+}
+
 static void fresnel_rows(void)
 {
     FILE *const file = pt_cases_open();
@@ -1350,6 +1370,7 @@ int main(int argc, char **argv)
     PT_TEST(diffuse);
     PT_TEST(diffuse_directions);
     PT_TEST_EXACT(black_and_mirror);
+    PT_TEST_EXACT(edge_on);
     PT_TEST_EXACT(fresnel_rows);
     PT_TEST(fresnel_of_diffuse_light);
     PT_TEST_EXACT(glass);

@@ -1692,6 +1692,7 @@ static void count_long(void *user, const char *word, int edges, pt_rgbd value)
     t[1] += edges - 1 > PT_WORD_MAX &&
             (word[0] != '*' || length != PT_WORD_MAX + 2 || word[length - 1] != 'E' || word[1] != 'D');
     t[2] += edges - 1 <= PT_WORD_MAX && (word[0] != 'L' || length != (size_t)edges + 1);
+    t[2] += strspn(word + 1, "D") + 2 != length && strspn(word + 1, "S") + 2 != length;
     t[3] += edges - 1 > PT_WORD_MAX;
 }
 
@@ -1702,6 +1703,7 @@ static void long_words(void)
     pt_sampler sampler = pt_sampler_make(PT_SAMPLER_INDEPENDENT, 1, 0);
     double t[4] = {0, 0, 0, 0};
     pt_li_info info;
+    int kind;
     e.options.max_edges = 200;
     e.options.roulette = PT_ROULETTE_NONE;
     e.options.observer = count_long;
@@ -1712,6 +1714,16 @@ static void long_words(void)
              "%g long and %g short words wrong, %g long", t[1], t[2], t[3]);
     pt_check_near("values of 200 edges", t[0], (1 - pow(0.99, 200)) / 0.01, 1e-3,
                   "long words lose their values");
+    /* Between mirrors first: should a letter of the next walk not be written, it finds an S there. */
+    for (kind = 0; kind < 2; kind++) {
+        scene.materials[0].kind = kind ? PT_MATERIAL_DIFFUSE : PT_MATERIAL_MIRROR;
+        e.li = kind ? pt_li_path_light : pt_li_path_plain;
+        memset(t, 0, sizeof t);
+        pt_sampler_start(&sampler, 0, 0);
+        one_path(&e, &sampler, &info);
+        pt_check(t[1] + t[2] <= (kind ? 0 : 199) && t[2] == 0 && t[3] > 130, kind ? "words, light sampled" : "words of mirrors",
+                 "%g long and %g short words wrong, %g long", t[1], t[2], t[3]);
+    }
     pt_scene_free(&scene);
 }
 
