@@ -827,6 +827,7 @@ static int parse(runner *r, int argc, char **argv)
         } else if (argv[i][0] != '-' && r->test_count < MAX_TESTS) r->tests[r->test_count++] = argv[i];
         else return 0;
     }
+    if (r->only) r->share = r->shares; /* a directory of its own */
     return r->test_count > 0;
 }
 

@@ -702,6 +702,26 @@ static int ask_for_light(const pt_scene *scene, pt_pcg32 *rng, vec at, double si
 
 /* Nothing is between a floor and lamps of all sizes, so nothing may occlude. A ray a little longer meets the
    lamp itself (unless it grazes a rim): it ended at the lamp, not before. */
+/* What stands before the end of a shadow ray shadows, by however little, near and far; at its end it does not. */
+static void before_the_end(void)
+{
+    int k, i;
+    for (k = -6; k <= 6; k++)
+        for (i = 0; i < 2; i++) {
+            const double d = pow(10, k), gap = 1e-5 * d;
+            pt_scene scene = PT_SCENE_INIT;
+            const int white = pt_add_material(&scene, pt_material_diffuse(pt_rgb_grey((pt_real)0.5)));
+            const pt_ray ray = {real3(vec3(0, 0, 0)), real3(vec3(d, 0, 0)), 1};
+            if (i == 0) pt_add_sphere(&scene, real3(vec3(d - gap - 0.01 * d, 0, 0)), (pt_real)(0.01 * d), white);
+            else
+                pt_add_triangle(&scene, real3(vec3(d - gap, -d, -d)), real3(vec3(d - gap, 2 * d, -d)),
+                                real3(vec3(d - gap, -d, 2 * d)), white);
+            pt_check(pt_commit(&scene) == PT_OK && pt_occluded(&scene, &ray), "just before the end",
+                     "distance 1e%d: %s does not shadow", k, i ? "a triangle" : "a sphere");
+            pt_scene_free(&scene);
+        }
+}
+
 static void shadow_rays(void)
 {
     static const double sizes[7] = {1e-3, 0.03, 1, 30, 1e3, 1e5, 1e6}, offsets[3] = {0, 25, 100};
@@ -1183,6 +1203,7 @@ int main(int argc, char **argv)
     PT_TEST_EXACT(what_a_hit_says);
     PT_TEST_EXACT(shading_normals);
     PT_TEST_EXACT(shadow_rays);
+    PT_TEST_EXACT(before_the_end);
     PT_TEST_EXACT(thin_gaps);
 #if PTI_HAS_BVH
     PT_TEST_EXACT(tree_shapes);

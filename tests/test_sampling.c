@@ -966,7 +966,8 @@ static void point_and_environment(void)
              "environment", "density of a ray that leaves");
     for (i = 0; i < (int)n; i++) {
         wrong += !pt_light_sample(&scene, environment, p, pair(&rng), &s) || s.delta ||
-                 dbl(s.radiance.r) != 2 || s.pdf_w != dbl(pt_warp_sphere_pdf_w());
+                 dbl(s.radiance.r) != 2 || s.pdf_w != dbl(pt_warp_sphere_pdf_w()) || length3(s.n) > 0 ||
+                 length3(s.p_error) > 0 || fabs(distance3(s.p, p) / dbl(s.distance) - 1) > 1e-5;
         pt_stats_add(&sky, fmax(0, dbl(s.wi.x)) * dbl(s.radiance.r) / s.pdf_w);
     }
     pt_check(wrong == 0, "environment", "%d samples are wrong", wrong);

@@ -1683,6 +1683,28 @@ static void observer_sums(void)
     pt_scene_free(&scene);
 }
 
+/* A path ends where its throughput is zero: between a red and a green mirror after two reflections. */
+static void red_then_green(void)
+{
+    pt_scene scene = PT_SCENE_INIT;
+    const int red = pt_add_material(&scene, pt_material_mirror(pt_rgb3(1, 0, 0))),
+              green = pt_add_material(&scene, pt_material_mirror(pt_rgb3(0, 1, 0)));
+    pt_sampler sampler = pt_sampler_make(PT_SAMPLER_INDEPENDENT, 1, 0);
+    const pt_ray ray = ray_from(v3(0.1, 0.2, 0), v3(0, 0, 1));
+    pt_li_options options;
+    pt_li_info info;
+    memset(&options, 0, sizeof options);
+    memset(&info, 0, sizeof info);
+    options.roulette = PT_ROULETTE_NONE;
+    options.max_edges = 50;
+    pt_add_parallelogram(&scene, v3(-1, -1, 1), v3(2, 0, 0), v3(0, 2, 0), red);
+    pt_add_parallelogram(&scene, v3(-1, -1, -1), v3(2, 0, 0), v3(0, 2, 0), green);
+    scene = committed(scene);
+    pt_li_path(&scene, &ray, &sampler, &options, &info);
+    pt_check(info.edges == 2 && info.rays == 2, "red, then green", "%d edges, %d rays", info.edges, (int)info.rays);
+    pt_scene_free(&scene);
+}
+
 /* Words of more than PT_WORD_MAX letters between L and E begin with '*'; their values are all there. */
 static void count_long(void *user, const char *word, int edges, pt_rgbd value)
 {
@@ -1956,6 +1978,7 @@ int main(int argc, char **argv)
     PT_TEST_EXACT(words);
     PT_TEST_EXACT(observer_sums);
     PT_TEST_EXACT(long_words);
+    PT_TEST_EXACT(red_then_green);
     PT_TEST(mistakes_direct);
     PT_TEST(mistakes_paths);
     PT_TEST(nothing_hidden);
