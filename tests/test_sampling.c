@@ -558,6 +558,39 @@ static void edge_on(void)
              "ior 1", "reflects, for u_lobe 0, with probability 0");
 }
 
+/* From points that rounding has put just before the plane of a light a sampled direction may round to one that
+   leads away from it: then there is no sample, and never one at a negative distance. */
+static void lights_edge_on(void)
+{
+    pt_pcg32 rng = generator(84);
+    int k, i, wrong = 0, sampled = 0;
+    for (k = 0; k < 64; k++) {
+        pt_scene scene = PT_SCENE_INIT;
+        const int lamp = pt_add_material(&scene, pt_material_emitter(pt_rgb_grey(1)));
+        pt_vec3 v[3];
+        for (i = 0; i < 3; i++) {
+            const double size = i == 0 ? 100 : 1;
+            v[i].x = real(size * (2 * pt_pcg32_double(&rng) - 1));
+            v[i].y = real(size * (2 * pt_pcg32_double(&rng) - 1));
+            v[i].z = real(size * (2 * pt_pcg32_double(&rng) - 1));
+        }
+        if (k & 1) pt_add_parallelogram(&scene, v[0], v[1], v[2], lamp);
+        else pt_add_triangle(&scene, v[0], pt_v3_add(v[0], v[1]), pt_v3_add(v[0], v[2]), lamp);
+        if (pt_commit(&scene) != PT_OK) wrong++;
+        for (i = 0; i < 8192; i++) {
+            const pt_vec2 at = pair(&rng), ends[2] = {{0, 0}, {real(1 - 0x1p-24), real(1 - 0x1p-24)}};
+            const pt_vec3 p = pt_v3_add(v[0], pt_v3_add(pt_v3_scale(v[1], 40 * at.x - 20), pt_v3_scale(v[2], 40 * at.y - 20)));
+            pt_light_sample_result s;
+            memset(&s, 0, sizeof s);
+            if (!pt_light_sample(&scene, 0, p, i % 3 < 2 ? ends[i % 3] : pair(&rng), &s)) continue;
+            sampled++;
+            wrong += !(s.distance > 0) || !(s.pdf_w > 0) || !(fabs(length3(s.wi) - 1) < 1e-5);
+        }
+        pt_scene_free(&scene);
+    }
+    pt_check(wrong == 0 && sampled > 10000, "lights seen edge-on", "%d of %d samples are wrong", wrong, sampled);
+}
+
 static void fresnel_rows(void)
 {
     FILE *const file = pt_cases_open();
@@ -1372,6 +1405,7 @@ int main(int argc, char **argv)
     PT_TEST(diffuse_directions);
     PT_TEST_EXACT(black_and_mirror);
     PT_TEST_EXACT(edge_on);
+    PT_TEST_EXACT(lights_edge_on);
     PT_TEST_EXACT(fresnel_rows);
     PT_TEST(fresnel_of_diffuse_light);
     PT_TEST_EXACT(glass);
