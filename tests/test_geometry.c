@@ -821,14 +821,15 @@ static int linear(const pt_scene *scene, const pt_ray *ray, double *t)
 }
 
 #if PTI_HAS_BVH
-/* Depth of the tree below a node; -1 if a box does not hold what is in it, or a primitive is met twice. */
+/* Depth of the tree below a node; -1 if a box does not hold what is in it, a primitive is met
+   twice, or a leaf has more than eight. */
 static int check_node(const pt_bvh *bvh, uint32_t node, const pt_vec3 *lo, const pt_vec3 *hi,
                       unsigned char *seen, int depth)
 {
     const pt_bvh_node *const n = &bvh->nodes[node];
     uint32_t i;
     int deepest = depth, child;
-    if (depth > PT_BVH_MAX_DEPTH || node >= bvh->node_count) return -1;
+    if (depth > PT_BVH_MAX_DEPTH || node >= bvh->node_count || n->count > 8) return -1;
     for (i = 0; n->count > 0 && i < n->count; i++) {
         const uint32_t p = bvh->order[n->first + i];
         if (p >= bvh->primitive_count || seen[p]++) return -1;
