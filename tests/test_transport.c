@@ -255,6 +255,7 @@ static void roulette_path_length(void)
     pt_scene scene = furnace_sphere(v3(0, 0, 0), 1, 0.5);
     experiment e = experiment_of(&scene, *furnace_ray(), PLAIN);
     pt_sampler sampler = pt_sampler_make(PT_SAMPLER_INDEPENDENT, pt_test_seed(170), 0);
+    const pt_stats none = PT_STATS_INIT;
     pt_stats edges = PT_STATS_INIT, square = PT_STATS_INIT;
     const uint32_t n = pt_test_samples(1300000);
     uint32_t i, strange = 0;
@@ -274,6 +275,17 @@ static void roulette_path_length(void)
     pt_check_mean("roulette: edges of a path", &edges, 2, 0, 0.005, PT_TEST_VALUES,
                   "the first roulette is drawn after edge 1, survival P_RR");
     pt_check_mean("roulette: variance of a path", &square, 2, 0, 0.05, PT_TEST_VALUES, "");
+    /* By throughput: 1/8 goes on after edge 3 with throughput 1, and a half after each further edge: 3 + 1/4. */
+    edges = none;
+    e.options.roulette = PT_ROULETTE_THROUGHPUT;
+    for (i = 0; i < n / 4; i++) {
+        pt_li_info info;
+        pt_sampler_start(&sampler, 1, i);
+        one_path(&e, &sampler, &info);
+        pt_stats_add(&edges, info.edges);
+    }
+    pt_check_mean("roulette by throughput: edges of a path", &edges, 3.25, 0, 0.01, PT_TEST_VALUES,
+                  "the survival is the throughput itself");
     pt_scene_free(&scene);
 }
 
