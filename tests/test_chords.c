@@ -168,6 +168,9 @@ static pt_vec3 on_part(const part *p, int half, pt_vec2 u, pt_vec3 *inwards)
     return pt_v3_add(p->corner, pt_v3_add(pt_v3_scale(p->e1, w.x), pt_v3_scale(p->e2, w.y)));
 }
 
+/* Uniform numbers stay below 1, whatever rounding does. */
+static pt_real below_one(double x) { return real(fmin(x, 1 - pt_gamma(1))); }
+
 /* From a uniform point of the surface, cosine-weighted inwards. The first number chooses the part, too. */
 static pt_ray ray_inwards(const body *b, pt_sampler *s)
 {
@@ -176,7 +179,7 @@ static pt_ray ray_inwards(const body *b, pt_sampler *s)
     pt_vec3 p, n;
     int i;
     for (i = 0; i + 1 < b->part_count && area >= b->parts[i].area; i++) area -= b->parts[i].area;
-    p = on_part(&b->parts[i], b->kind == HEMISPHERE, pt_v2(real(area / b->parts[i].area), u.y), &n);
+    p = on_part(&b->parts[i], b->kind == HEMISPHERE, pt_v2(below_one(area / b->parts[i].area), u.y), &n);
     return leave(p, n, cosine_around(n, s));
 }
 
