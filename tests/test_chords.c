@@ -267,12 +267,12 @@ static double chord_of_lines(const void *user, pt_sampler *s)
     return pow(chord_of_line(b, &ray), b->power) * 4 * PT_PI * b->bound * b->bound / b->surface;
 }
 
-/* Lines that miss the body add to the spread: their bound is 1 %. */
+/* Lines that miss the body add to the spread: their bound is 2 %. */
 static void check_chords(const row *r, const body *b, uint32_t points)
 {
     check_bound(row_label(r->id, "from the surface"), chord_from_surface, b, points, r->value, 0, BOUND,
                 "a ray inside does not end at the surface, or directions are not cosine-weighted");
-    check_bound(row_label(r->id, "by lines"), chord_of_lines, b, points, r->value, 0, 2 * BOUND,
+    check_bound(row_label(r->id, "by lines"), chord_of_lines, b, points / 2, r->value, 0, 4 * BOUND,
                 "a line is not followed through the body: pt_spawn_ray on the far side of a hit");
 }
 
@@ -499,7 +499,7 @@ static void planes_of_a_grid(void)
     while ((r = next_row("GP-GRID", NULL, &at)) != NULL) {
         grid g;
         make_grid(&g, parameter(r, "L") / parameter(r, "a"));
-        check_bound(row_label(r->id, "planes"), planes_crossed, &g, 256, r->value, 0, BOUND,
+        check_bound(row_label(r->id, "planes"), planes_crossed, &g, g.length > 15 ? 128 : 256, r->value, 0, BOUND,
                     "a plane is missed, or met again after pt_spawn_ray; or tmax is not kept");
         pt_scene_free(&g.scene);
     }
@@ -632,8 +632,8 @@ static void walks(void)
         for (k = 0; k < 2; k++) { /* three collisions a length: the spread of the ways is four times as wide */
             body b = make_body(r, "body", "size");
             b.sigma = sigma[k];
-            check_bound(row_label(r->id, k ? "many turns" : "few turns"), way_through, &b, 2 * POINTS,
-                        r->value, 0, k ? 4 * BOUND : 2 * BOUND,
+            check_bound(row_label(r->id, k ? "many turns" : "few turns"), way_through, &b, k ? POINTS : 2 * POINTS,
+                        r->value, 0, k ? 6 * BOUND : 2 * BOUND,
                         "the mean way through depends on how often a walk turns: rays inside leak, or do not "
                         "end");
             pt_scene_free(&b.scene);
