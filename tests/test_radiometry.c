@@ -248,6 +248,67 @@ static void add_disk(pt_scene *scene, double r, double y, int up, int material)
         pt_add_triangle(scene, v3(0, y, 0), rim(r, y, up ? i + 1 : i), rim(r, y, up ? i : i + 1), material);
 }
 
+/* One value of the irradiance under a disk, in four ways, and its squared difference from the mean. All four
+   have the same mean; what differs is the variance, by which a technique is chosen. */
+enum { BY_HEMISPHERE, BY_COSINE, BY_AREA, BY_CONE };
+
+typedef struct disk_technique {
+    disk d;
+    int how;
+    double mean;
+} disk_technique;
+
+static double one_value_under_disk(const disk_technique *t, pt_sampler *s)
+{
+    const double tangent = t->d.r / t->d.h, half = atan(tangent);
+    const pt_vec2 u = pt_sampler_2d(s);
+    pt_vec3 w;
+    if (t->how == BY_AREA) {
+        const pt_vec2 p = pt_warp_disk(u);
+        const double q = tangent * tangent * ((double)p.x * (double)p.x + (double)p.y * (double)p.y);
+        return tangent * tangent / ((1 + q) * (1 + q)) / (double)pt_warp_disk_pdf_a();
+    }
+    if (t->how == BY_CONE) {
+        const double omc = 2 * sin(half / 2) * sin(half / 2);
+        return (double)pt_warp_cone(u, omc).z / pt_warp_cone_pdf_w(omc);
+    }
+    w = t->how == BY_COSINE ? pt_warp_cosine(u) : pt_warp_hemisphere(u);
+    if ((double)w.z < cos(half)) return 0;
+    return (double)w.z / (double)(t->how == BY_COSINE ? pt_warp_cosine_pdf_w(w) : pt_warp_hemisphere_pdf_w(w));
+}
+static double squared_deviation(const void *user, pt_sampler *s)
+{
+    const disk_technique *const t = (const disk_technique *)user;
+    const double x = one_value_under_disk(t, s) - t->mean;
+    return x * x;
+}
+
+/* Below the centre of a disk of half angle a: E = pi sin^2 a. Second moments: 4 pi^2 (1 - cos^3 a) / 3 by
+   uniform directions, pi^2 sin^2 a by cosine-weighted ones, pi^2 tan^2 a (1 - cos^6 a) / 3 by points uniform in
+   area, 4 pi^2 (1 - cos a) (1 - cos^3 a) / 3 by directions uniform in the cone. */
+static void disk_variances(void)
+{
+    static const char *const names[4] = {"uniform directions", "cosine-weighted", "uniform in area",
+                                         "uniform in the cone"};
+    static const double radius[2] = {1, 3};
+    int i, k;
+    for (i = 0; i < 2; i++) {
+        const double a = atan(radius[i]), c = cos(a), s2 = sin(a) * sin(a), pi2 = PT_PI * PT_PI;
+        const double second[4] = {4 * pi2 * (1 - c * c * c) / 3, pi2 * s2,
+                                  pi2 * radius[i] * radius[i] * (1 - pow(c, 6)) / 3,
+                                  4 * pi2 * (1 - c) * (1 - c * c * c) / 3};
+        for (k = 0; k < 4; k++) {
+            disk_technique t = {{0, 1, 0}, 0, 0};
+            t.d.r = radius[i];
+            t.how = k;
+            t.mean = PT_PI * s2;
+            check_bound(label("variance under a disk of radius %g, %s", radius[i], names[k]),
+                        squared_deviation, &t, 8 * POINTS, second[k] - t.mean * t.mean, 0, 2 * BOUND,
+                        "the density of a warp is not the one that its directions have");
+        }
+    }
+}
+
 static void disks(void)
 {
     const row *r;
@@ -1306,6 +1367,7 @@ int main(int argc, char **argv)
     PT_TEST(directions_in_caps);
     PT_TEST(solid_angles_of_flat_shapes);
     PT_TEST(disks);
+    PT_TEST(disk_variances);
     PT_TEST_EXACT(point_lights);
     PT_TEST(spots);
     PT_TEST(sphere_lights);
