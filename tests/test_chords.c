@@ -633,7 +633,7 @@ static void walks(void)
             body b = make_body(r, "body", "size");
             b.sigma = sigma[k];
             check_bound(row_label(r->id, k ? "many turns" : "few turns"), way_through, &b, k ? POINTS : 2 * POINTS,
-                        r->value, 0, k ? 6 * BOUND : 2 * BOUND,
+                        r->value, 0, k ? 8 * BOUND : 3 * BOUND,
                         "the mean way through depends on how often a walk turns: rays inside leak, or do not "
                         "end");
             pt_scene_free(&b.scene);
