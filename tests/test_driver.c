@@ -928,6 +928,36 @@ static void methods(void)
     pt_scene_free(&s.scene);
 }
 
+/* A scene without any surface: black, or the sky and nothing else, by every method, in a picture that is not
+   square. */
+static void empty_scenes(void)
+{
+    int count, i, k, sky;
+    const pt_method *const m = pt_methods(&count);
+    for (sky = 0; sky < 2; sky++)
+        for (i = 0; i < count; i++) {
+            stage s;
+            pt_render_desc d;
+            pt_film film;
+            int off = 0;
+            memset(&s, 0, sizeof s);
+            s.camera = pt_camera_look_at(pt_v3(1, 2, 3), pt_v3(0, 0, 0), pt_v3(0, 1, 0), 50);
+            if (sky) pt_set_environment(&s.scene, grey(0.75));
+            pt_check(pt_commit(&s.scene) == PT_OK, "empty scene", "%s", pt_scene_error(&s.scene));
+            d = desc_of(&s, 5, 3, 4);
+            d.method = m[i].name;
+            film = render(&s, &d);
+            for (k = 0; k < 15; k++) {
+                const pt_rgbd v = pt_film_pixel(&film, k % 5, k / 5);
+                off += fabs(v.r - 0.75 * sky) + fabs(v.g - 0.75 * sky) + fabs(v.b - 0.75 * sky) > 0;
+            }
+            pt_check(off == 0, label("empty scene %s, %s", sky ? "with a sky" : "without", m[i].name),
+                     "%d of 15 pixels are wrong: a ray that meets nothing brings the sky's radiance", off);
+            pt_film_free(&film);
+            pt_scene_free(&s.scene);
+        }
+}
+
 /* ---- splats ----------------------------------------------------------------------------------------- */
 
 /* List number i of a pass, as whichever thread fills it would. */
@@ -1619,6 +1649,7 @@ int main(int argc, char **argv)
     PT_TEST_EXACT(progress_and_cancel);
     PT_TEST_EXACT(endless_paths);
     PT_TEST_EXACT(methods);
+    PT_TEST_EXACT(empty_scenes);
     PT_TEST_EXACT(splats);
     PT_TEST_EXACT(file_ppm);
     PT_TEST_EXACT(file_ppm_bytes);

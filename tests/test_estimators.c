@@ -3,88 +3,10 @@
    end every row must have been used. */
 
 #define PATHTRACER_IMPLEMENTATION
-#include "pt_cases.h"
+#include "pt_rows.h"
 
 #define ROWS_PATH "tests/data/oracles_mc.csv"
-#define ROWS_MAX 256
 #define REPEATS 1024u /* how often an estimate is repeated where the spread of its results is looked at */
-
-/* ---------------------------------------------------------------------------------------------------------
-   The exact values */
-
-typedef struct row {
-    char line[256]; /* comments of the file included */
-    const char *id, *quantity, *params;
-    double value, error;
-    int used;
-} row;
-
-static row rows[ROWS_MAX];
-static int row_count;
-
-static int load_rows(void)
-{
-    FILE *const file = fopen(ROWS_PATH, "r");
-    while (file && row_count < ROWS_MAX && fgets(rows[row_count].line, sizeof rows[0].line, file)) {
-        row *const r = &rows[row_count];
-        char *rest = r->line;
-        if (r->line[0] == '#') continue;
-        r->id = pt_case_field(&rest);
-        r->quantity = pt_case_field(&rest);
-        r->params = pt_case_field(&rest);
-        r->value = strtod(pt_case_field(&rest), NULL);
-        r->error = strtod(pt_case_field(&rest), NULL);
-        row_count++;
-    }
-    if (file) fclose(file);
-    if (row_count == 0)
-        printf("%s cannot read " ROWS_PATH "; run the tests from the root of the repository\n",
-               pt_test_count(0));
-    return row_count > 0;
-}
-
-static int in_table(const row *r, const char *table)
-{
-    const size_t length = strlen(table);
-    return strncmp(r->id, table, length) == 0 && r->id[length] == '-';
-}
-
-/* The next row of a table with that quantity, NULL at the end; `at` begins at 0. */
-static const row *next_row(const char *table, const char *quantity, int *at)
-{
-    while (*at < row_count) {
-        row *const r = &rows[(*at)++];
-        if (!in_table(r, table) || strcmp(r->quantity, quantity) != 0) continue;
-        r->used = 1;
-        return r;
-    }
-    return NULL;
-}
-
-static const row *find_row(const char *table, const char *quantity, const char *params)
-{
-    const row *r;
-    int at = 0;
-    while ((r = next_row(table, quantity, &at)) != NULL && strcmp(r->params, params) != 0) {
-    }
-    pt_check(r != NULL, "exact values", "no row %s %s %s", table, quantity, params);
-    return r ? r : &rows[0];
-}
-
-static double parameter(const row *r, const char *key) { return pt_case_number(r->params, key); }
-
-static void every_row_is_used(void)
-{
-    int i;
-    for (i = 0; i < row_count; i++)
-        pt_check(rows[i].used, "rows in use", "%s %s %s", rows[i].id, rows[i].quantity, rows[i].params);
-}
-
-static void near_relative(const char *name, double got, double exact, double tolerance)
-{
-    pt_check(fabs(got - exact) <= tolerance * fabs(exact), name, "got %.17g, exact %.17g, relative %.3g", got,
-             exact, fabs(got - exact) / fabs(exact));
-}
 
 /* ---------------------------------------------------------------------------------------------------------
    Integrands; user points to their parameters */
@@ -1608,7 +1530,7 @@ static void variance_of_variance(void)
 int main(int argc, char **argv)
 {
     pt_test_begin("test_estimators", argc, argv);
-    if (!load_rows()) return pt_test_end();
+    if (!load_rows(ROWS_PATH)) return pt_test_end();
     PT_TEST(one_dimension);
     PT_TEST(many_dimensions);
     PT_TEST(genz);

@@ -11,182 +11,29 @@
      VF-CUBE6 (one radiosity a face) is not in the table: path tracing converges to VF-CUBE1 instead. */
 
 #define PATHTRACER_IMPLEMENTATION
-#include "pt_cases.h"
+#include "pt_means.h"
 
 #include <float.h>
 
 #define ROWS_PATH "tests/data/oracles_radiometry.csv"
-#define ROWS_MAX 256
-#define BOUND 0.005        /* what all checks must be able to see but those that name their own */
-#define RANDOMISATIONS 64u /* of the Sobol points of an estimate; their spread gives the error */
-#define POINTS 1024u       /* in each of them, */
-#define MANY 2048u         /*   where only hits and misses are counted */
-#define RARE 0.01          /* hits rarer than this are not counted */
-#define SIDES 256          /* of the prism that stands for a cylinder, the polygon for a disk */
-#define FAR 1e4            /* half the length of an infinite strip: what it misses is of order 1e-8 */
-#define GRID 40            /* triangles along an edge of the octahedron that becomes a sphere */
+#define POINTS 1024u /* in each randomisation of an estimate, */
+#define MANY 2048u   /*   where only hits and misses are counted */
+#define RARE 0.01    /* hits rarer than this are not counted */
+#define SIDES 256    /* of the prism that stands for a cylinder, the polygon for a disk */
+#define FAR 1e4      /* half the length of an infinite strip: what it misses is of order 1e-8 */
+#define GRID 40      /* triangles along an edge of the octahedron that becomes a sphere */
 
-/* ---------------------------------------------------------------------------------------------------------
-   The exact values */
-
-typedef struct row {
-    char line[256];
-    const char *id, *quantity, *params;
-    double value;
-    int used;
-} row;
-
-static row rows[ROWS_MAX];
-static int row_count;
-
-static int load_rows(void)
-{
-    FILE *const file = fopen(ROWS_PATH, "r");
-    while (file && row_count < ROWS_MAX && fgets(rows[row_count].line, sizeof rows[0].line, file)) {
-        row *const r = &rows[row_count];
-        char *rest = r->line;
-        if (r->line[0] == '#') continue;
-        r->id = pt_case_field(&rest);
-        r->quantity = pt_case_field(&rest);
-        r->params = pt_case_field(&rest);
-        r->value = strtod(pt_case_field(&rest), NULL);
-        row_count++;
-    }
-    if (file) fclose(file);
-    if (row_count == 0)
-        printf("%s cannot read " ROWS_PATH "; run the tests from the root of the repository\n",
-               pt_test_count(0));
-    return row_count > 0;
-}
-
-/* The next row of a table, with that quantity unless it is NULL; NULL at the end. `at` begins at 0. */
-static const row *next_row(const char *table, const char *quantity, int *at)
-{
-    const size_t length = strlen(table);
-    while (*at < row_count) {
-        row *const r = &rows[(*at)++];
-        if (strncmp(r->id, table, length) != 0 || r->id[length] != '-') continue;
-        if (quantity && strcmp(r->quantity, quantity) != 0) continue;
-        r->used = 1;
-        return r;
-    }
-    return NULL;
-}
-
-static double parameter(const row *r, const char *key) { return pt_case_number(r->params, key); }
-static int has(const row *r, const char *key) { return pt_case_find(r->params, key, '=') != NULL; }
-
-/* Numbers of a list like ((-1 -1 1) (1 0 2)), at most max; returns how many. */
-static int numbers(const row *r, const char *key, double *out, int max)
-{
-    const char *at = pt_case_find(r->params, key, '=');
-    int n = 0;
-    while (at && *at && *at != ';' && n < max) {
-        char *end;
-        out[n] = strtod(at, &end);
-        if (end == at) at++;
-        else n++, at = end;
-    }
-    return n;
-}
-
-static void every_row_is_used(void)
-{
-    int i;
-    for (i = 0; i < row_count; i++)
-        pt_check(rows[i].used, "rows in use", "%s %s %s", rows[i].id, rows[i].quantity, rows[i].params);
-}
-
-/* ---------------------------------------------------------------------------------------------------------
-   Small things */
-
-static int is_float(void) { return sizeof(pt_real) == sizeof(float); }
-static pt_real real(double x) { return (pt_real)x; }
-static pt_vec3 v3(double x, double y, double z) { return pt_v3((pt_real)x, (pt_real)y, (pt_real)z); }
-static pt_rgb grey(double x) { return pt_rgb_grey((pt_real)x); }
-static double degrees(double x) { return x * (PT_PI / 180); }
-static double dot(pt_vec3 a, pt_vec3 b)
-{
-    return (double)a.x * (double)b.x + (double)a.y * (double)b.y + (double)a.z * (double)b.z;
-}
-/* How far the numbers of a build may carry a value away: coordinates and random numbers of 24 bits, or of
-   53 and 32. */
-static double rounding(void) { return is_float() ? 1e-6 : 1e-9; }
-
-static const char *row_label(const char *id, const char *what)
-{
-    static char text[96];
-    snprintf(text, sizeof text, "%s %s", id, what);
-    return text;
-}
-
-static void near_relative(const char *name, double got, double exact, double tolerance)
-{
-    pt_check(fabs(got - exact) <= tolerance * fabs(exact), name, "got %.17g, exact %.17g, relative %.3g", got,
-             exact, fabs(got - exact) / fabs(exact));
-}
-
-static void commit(pt_scene *scene)
-{
-    pt_check(pt_commit(scene) == PT_OK, "scene", "%s", pt_scene_error(scene));
-}
-
-static int lamp(pt_scene *scene, double radiance)
-{
-    return pt_add_material(scene, pt_material_emitter(grey(radiance)));
-}
-static int wall(pt_scene *scene, double albedo)
-{
-    return pt_add_material(scene, pt_material_diffuse(grey(albedo)));
-}
-
-/* An estimator draws its numbers in order and returns one value. */
-typedef double (*estimator)(const void *user, pt_sampler *s);
-
-static uint64_t seed_of(const char *name, uint32_t randomisation)
-{
-    uint64_t h = 0;
-    for (; *name; name++) h = pt_hash64(h ^ (unsigned char)*name);
-    return h + pt_test_seed(randomisation);
-}
-
-static pt_stats estimate(const char *name, estimator f, const void *user, uint32_t points)
-{
-    const uint32_t n = pt_test_samples(points);
-    pt_stats s = PT_STATS_INIT;
-    uint32_t r, i;
-    for (r = 0; r < RANDOMISATIONS; r++) {
-        pt_sampler sampler = pt_sampler_make(PT_SAMPLER_SOBOL, seed_of(name, r), 0);
-        double sum = 0;
-        for (i = 0; i < n; i++) {
-            pt_sampler_start(&sampler, 0, i);
-            sum += f(user, &sampler);
-        }
-        pt_stats_add(&s, sum / n);
-    }
-    return s;
-}
-
-/* error: of the exact value, relative, beyond rounding */
-static void check_bound(const char *name, estimator f, const void *user, uint32_t points, double exact,
-                        double error, double bound, const char *hint)
-{
-    const pt_stats s = estimate(name, f, user, points);
-    pt_check_mean(name, &s, exact, (error + rounding()) * fabs(exact), bound, PT_TEST_MEANS, hint);
-}
 static void check(const char *name, estimator f, const void *user, double exact, double error,
                   const char *hint)
 {
     check_bound(name, f, user, POINTS, exact, error, BOUND, hint);
 }
 
-/* Counting hits of which a share p is expected. Points spread well make the error at most 3/4 of what
-   binomial counts have (9 standard errors are seen); left out where hits are rare. */
+/* Hits of which a share p is expected; left out where they are rare. */
 static void check_hits(const char *name, estimator f, const void *user, double exact, double p, double error,
                        const char *hint)
 {
-    const double binomial = sqrt((1 - p) / (p * MANY * RANDOMISATIONS)), bound = 7 * binomial;
-    if (p >= RARE) check_bound(name, f, user, MANY, exact, error, fmax(bound, 2 * BOUND), hint);
+    if (p >= RARE) check_count(name, f, user, MANY, exact, p, error, hint);
 }
 
 /* ---------------------------------------------------------------------------------------------------------
@@ -196,15 +43,6 @@ typedef struct receiver {
     const pt_scene *scene;
     pt_vec3 p, n;
 } receiver;
-
-static pt_ray ray_from(pt_vec3 p, pt_vec3 d)
-{
-    pt_ray ray;
-    ray.o = p;
-    ray.d = d;
-    ray.tmax = real(HUGE_VAL);
-    return ray;
-}
 
 static double seen(const pt_scene *scene, const pt_ray *ray)
 {
@@ -408,6 +246,67 @@ static void add_disk(pt_scene *scene, double r, double y, int up, int material)
     int i;
     for (i = 0; i < SIDES; i++)
         pt_add_triangle(scene, v3(0, y, 0), rim(r, y, up ? i + 1 : i), rim(r, y, up ? i : i + 1), material);
+}
+
+/* One value of the irradiance under a disk, in four ways, and its squared difference from the mean. All four
+   have the same mean; what differs is the variance, by which a technique is chosen. */
+enum { BY_HEMISPHERE, BY_COSINE, BY_AREA, BY_CONE };
+
+typedef struct disk_technique {
+    disk d;
+    int how;
+    double mean;
+} disk_technique;
+
+static double one_value_under_disk(const disk_technique *t, pt_sampler *s)
+{
+    const double tangent = t->d.r / t->d.h, half = atan(tangent);
+    const pt_vec2 u = pt_sampler_2d(s);
+    pt_vec3 w;
+    if (t->how == BY_AREA) {
+        const pt_vec2 p = pt_warp_disk(u);
+        const double q = tangent * tangent * ((double)p.x * (double)p.x + (double)p.y * (double)p.y);
+        return tangent * tangent / ((1 + q) * (1 + q)) / (double)pt_warp_disk_pdf_a();
+    }
+    if (t->how == BY_CONE) {
+        const double omc = 2 * sin(half / 2) * sin(half / 2);
+        return (double)pt_warp_cone(u, omc).z / pt_warp_cone_pdf_w(omc);
+    }
+    w = t->how == BY_COSINE ? pt_warp_cosine(u) : pt_warp_hemisphere(u);
+    if ((double)w.z < cos(half)) return 0;
+    return (double)w.z / (double)(t->how == BY_COSINE ? pt_warp_cosine_pdf_w(w) : pt_warp_hemisphere_pdf_w(w));
+}
+static double squared_deviation(const void *user, pt_sampler *s)
+{
+    const disk_technique *const t = (const disk_technique *)user;
+    const double x = one_value_under_disk(t, s) - t->mean;
+    return x * x;
+}
+
+/* Below the centre of a disk of half angle a: E = pi sin^2 a. Second moments: 4 pi^2 (1 - cos^3 a) / 3 by
+   uniform directions, pi^2 sin^2 a by cosine-weighted ones, pi^2 tan^2 a (1 - cos^6 a) / 3 by points uniform in
+   area, 4 pi^2 (1 - cos a) (1 - cos^3 a) / 3 by directions uniform in the cone. */
+static void disk_variances(void)
+{
+    static const char *const names[4] = {"uniform directions", "cosine-weighted", "uniform in area",
+                                         "uniform in the cone"};
+    static const double radius[2] = {1, 3};
+    int i, k;
+    for (i = 0; i < 2; i++) {
+        const double a = atan(radius[i]), c = cos(a), s2 = sin(a) * sin(a), pi2 = PT_PI * PT_PI;
+        const double second[4] = {4 * pi2 * (1 - c * c * c) / 3, pi2 * s2,
+                                  pi2 * radius[i] * radius[i] * (1 - pow(c, 6)) / 3,
+                                  4 * pi2 * (1 - c) * (1 - c * c * c) / 3};
+        for (k = 0; k < 4; k++) {
+            disk_technique t = {{0, 1, 0}, 0, 0};
+            t.d.r = radius[i];
+            t.how = k;
+            t.mean = PT_PI * s2;
+            check_bound(label("variance under a disk of radius %g, %s", radius[i], names[k]),
+                        squared_deviation, &t, 8 * POINTS, second[k] - t.mean * t.mean, 0, 2 * BOUND,
+                        "the density of a warp is not the one that its directions have");
+        }
+    }
 }
 
 static void disks(void)
@@ -1066,19 +965,6 @@ static void sphere_and_disk(void)
     }
 }
 
-/* A ray from a point whose coordinates were rounded, the magnitude of which is at most 2. */
-static pt_ray leave(pt_vec3 p, pt_vec3 n, pt_vec3 w)
-{
-    const pt_real e = real(4 * pt_gamma(3));
-    return pt_spawn_ray(p, pt_v3(e, e, e), n, w);
-}
-
-static pt_vec3 cosine_around(pt_vec3 n, pt_sampler *s)
-{
-    const pt_frame frame = pt_frame_from_normal(n);
-    return pt_frame_to_world(&frame, pt_warp_cosine(pt_sampler_2d(s)));
-}
-
 /* From the outer of two spheres inwards: does the ray meet the inner one? One that meets none escaped. */
 static double onto_inner_sphere(const void *user, pt_sampler *s)
 {
@@ -1476,11 +1362,12 @@ static void concentric_spheres_that_shine(void)
 int main(int argc, char **argv)
 {
     pt_test_begin("test_radiometry", argc, argv);
-    if (!load_rows()) return pt_test_end();
+    if (!load_rows(ROWS_PATH)) return pt_test_end();
     PT_TEST(solid_angles_of_spheres);
     PT_TEST(directions_in_caps);
     PT_TEST(solid_angles_of_flat_shapes);
     PT_TEST(disks);
+    PT_TEST(disk_variances);
     PT_TEST_EXACT(point_lights);
     PT_TEST(spots);
     PT_TEST(sphere_lights);

@@ -481,32 +481,40 @@ static void diffuse(void)
     one_story("the same from below", &t, below, PT_RADIANCE, 75, -dbl(m.albedo.r));
 }
 
-/* Sampled directions against pdf cos/pi, with a normal that is no axis. */
-static void diffuse_directions(void)
+/* Sampled directions against pdf cos/pi, with a normal that is no axis: from above and below, along the normal
+   and at 89 degrees, for radiance and for importance. */
+static void directions_from(const pt_bsdf *b, pt_vec3 wo, int side, pt_transport mode, uint64_t seed)
 {
     const uint32_t n = pt_test_samples(1u << 17);
+    pt_pcg32 rng = generator(seed);
+    double counts[256] = {0};
+    uint32_t i, outside = 0;
+    for (i = 0; i < n; i++) {
+        pt_bsdf_sample_result s;
+        pt_vec3 l;
+        const pt_vec2 u = pair(&rng);
+        const int got = pt_bsdf_sample(b, wo, pt_pcg32_double(&rng), u, mode, &s);
+        l = pt_frame_to_local(&b->frame, s.wi);
+        outside += !got || dbl(l.z) * side <= 0 || s.lobe != PT_LOBE_DIFFUSE || dbl(s.eta) != 1;
+        counts[cell(dbl(l.z) * dbl(l.z), 16) * 16 + cell(turn(dbl(l.y), dbl(l.x)), 16)]++;
+    }
+    pt_check(outside == 0, "diffuse directions", "%u of %u go through the surface, or were not sampled",
+             outside, n);
+    expect_uniform("diffuse directions", counts, 256, "not cosine weighted");
+}
+
+static void diffuse_directions(void)
+{
     const pt_material m = pt_material_diffuse(pt_rgb_grey(1));
     const pt_vec3 normal = pt_v3_normalize(pt_v3(-3, 1, real(0.5)));
     const pt_hit hit = hit_of(normal, normal);
     const pt_bsdf b = pt_bsdf_make(&m, &hit);
-    int side;
-    for (side = 1; side >= -1; side -= 2) {
-        pt_pcg32 rng = generator((uint64_t)(78 + side));
-        double counts[256] = {0};
-        int i, outside = 0;
-        for (i = 0; i < (int)n; i++) {
-            pt_bsdf_sample_result s;
-            pt_vec3 l;
-            const pt_vec2 u = pair(&rng);
-            const int got = pt_bsdf_sample(&b, pt_v3_scale(normal, real(side)), pt_pcg32_double(&rng), u,
-                                           PT_RADIANCE, &s);
-            l = pt_frame_to_local(&b.frame, s.wi);
-            outside += !got || dbl(l.z) * side <= 0 || s.lobe != PT_LOBE_DIFFUSE || dbl(s.eta) != 1;
-            counts[cell(dbl(l.z) * dbl(l.z), 16) * 16 + cell(turn(dbl(l.y), dbl(l.x)), 16)]++;
-        }
-        pt_check(outside == 0, "diffuse directions", "%d of %u go through the surface, or were not sampled",
-                 outside, n);
-        expect_uniform("diffuse directions", counts, 256, "not cosine weighted");
+    int k;
+    for (k = 0; k < 8; k++) {
+        const int side = k & 1 ? 1 : -1;
+        const double t = k & 2 ? 89 * PT_PI / 180 : 0;
+        const pt_vec3 wo = pt_frame_to_world(&b.frame, v3(0.6 * sin(t), 0.8 * sin(t), side * cos(t)));
+        directions_from(&b, wo, side, k & 4 ? PT_IMPORTANCE : PT_RADIANCE, (uint64_t)(700 + k));
     }
 }
 
