@@ -147,7 +147,7 @@ static uint64_t seed_of(const char *name, uint32_t randomisation)
 {
     uint64_t h = 0;
     for (; *name; name++) h = pt_hash64(h ^ (unsigned char)*name);
-    return h + pt_test_seed(randomisation);
+    return pt_test_seed(h + randomisation);
 }
 
 static pt_stats estimate(const char *name, estimator f, const void *user, uint32_t points)
