@@ -17,7 +17,7 @@
                   power was shown with all samples. That skewness allows a verdict is still asked: checks that
                   would not have it with a quarter ask for pt_test_all_samples().
        LONG=1     pt_test_long() is 1: more samples where a test knows how to use them
-       VERBOSE=1  deterministic checks that pass print a line too
+       VERBOSE=1  deterministic checks that pass print a line too; k, see below, is shown
 
    Two kinds of checks. A deterministic one compares with a tolerance. A statistical one asks whether data
    could come from a correct program: all of a suite together may fail by luck once in a million runs, which
@@ -241,6 +241,7 @@ static inline void pt_test_judge(const char *name, const pt_judged_mean *m, doub
            pt_test_count(why[0] == '\0'), name, m->n, m->value, m->exact, m->se, z,
            relative ? 100 * sees : sees, relative ? " %" : "", relative ? 100 * bound : bound, p_text,
            pt_test_lap());
+    if (pt_test.is_verbose && k > 0) printf("       k %.2f\n", k);
     if (why[0] != '\0') printf("       %s%s\n", why, hint);
 }
 

@@ -705,7 +705,7 @@ static void check_estimate(const char *name, const stage *s, pt_render_desc d, u
     for (i = 0, seeds = pt_test_samples(seeds); i < seeds; i++) {
         pt_error estimated, real;
         pt_film film;
-        d.seed = pt_test_seed(5000 + i);
+        d.seed = pt_test_seed(5000 + 500 * (uint64_t)d.sampler + i);
         film = render(s, &d);
         pt_film_error_estimate(&film, &estimated);
         pt_film_error(&film, reference->picture, &real);
@@ -724,24 +724,25 @@ static void check_estimate(const char *name, const stage *s, pt_render_desc d, u
         pt_check(reach <= 0.1, label("%s, interval", name), "reaches %.3g from 1: more seeds", reach);
 }
 
-/* The short form: a furnace, where every pixel is exactly 2. Estimated and true squared error of a picture of
+/* The short form: a furnace, where paths of three edges make every pixel exactly 1 + 1/2 + 1/4. Estimated and true squared error of a picture of
    P pixels (grey: the bands are equal) each spread by about sqrt(2 / P), and are independent: 64 seeds of 24
    x 24 pixels give a standard error of 2 / sqrt(64 P) = 1 %, and the interval is 7 to 8 of these to each
    side. */
 static void estimated_error(void)
 {
     static const pt_sampler_kind kind[2] = {PT_SAMPLER_INDEPENDENT, PT_SAMPLER_SOBOL};
-    const uint32_t spp = pt_test_long() ? 64 : 16;
+    const uint32_t spp = pt_test_long() ? 64 : 8;
     stage s = stage_of("furnace");
     float picture[24 * 24 * 3];
     truth exact;
     int i, k;
-    for (i = 0; i < 24 * 24 * 3; i++) picture[i] = 2;
+    for (i = 0; i < 24 * 24 * 3; i++) picture[i] = 1.75f;
     exact.picture = picture;
     exact.mse = 0;
     for (k = 0; k < 2; k++) {
         pt_render_desc d = desc_of(&s, 24, 24, spp);
         d.sampler = kind[k];
+        d.li.max_edges = 3;
         check_estimate(
             label("estimated error, furnace, %s, %u samples", pt_sampler_name(kind[k]), (unsigned)spp), &s, d,
             64, &exact);
@@ -755,7 +756,7 @@ static void estimated_error(void)
 static void estimated_error_cornell(void)
 {
     static const pt_sampler_kind kind[2] = {PT_SAMPLER_INDEPENDENT, PT_SAMPLER_SOBOL};
-    static const uint32_t spp[3] = {16, 64, 256};
+    static const uint32_t spp[3] = {8, 64, 256};
     enum { SIDE = 24 };
     static float picture[SIDE * SIDE * 3];
     stage s = stage_of("cornell");
@@ -765,7 +766,7 @@ static void estimated_error_cornell(void)
     truth reference;
     int i, k;
     s.camera = pt_camera_look_at(pt_v3(278, 273, -800), pt_v3(278, 200, 280), pt_v3(0, 1, 0), 24);
-    d = desc_of(&s, SIDE, SIDE, pt_test_long() ? 32768 : pt_test_samples(2048));
+    d = desc_of(&s, SIDE, SIDE, pt_test_long() ? 32768 : pt_test_samples(1024));
     d.seed = pt_test_seed(4999);
     film = render(&s, &d);
     for (i = 0; i < SIDE * SIDE; i++) {

@@ -319,7 +319,8 @@ static void check_variance(const char *name, const pt_stats *seen, double mean, 
 static void mean_and_variance(const job *j, uint32_t n, double variance, double bound, double variance_bound,
                               uint64_t seed)
 {
-    const tally t = repeat(j, REPEATS, pt_test_samples(n), PT_SAMPLER_INDEPENDENT, seed);
+    const uint32_t values = n > 1024 ? pt_test_all_samples(n) : pt_test_samples(n); /* many: skewed */
+    const tally t = repeat(j, REPEATS, values, PT_SAMPLER_INDEPENDENT, seed);
     char name[96];
     sprintf(name, "mean: %.80s", j->name);
     pt_check_mean(name, &t.units, j->exact, 0, bound, PT_TEST_VALUES, "the estimator is biased");
@@ -409,7 +410,7 @@ static void genz(void)
             for (k = 0; k < 3; k++, seed += 300) {
                 const int independent = kinds[k] == PT_SAMPLER_INDEPENDENT;
                 const uint32_t n = independent ? 8192 : 2048; /* corner peaks are skewed: more of them */
-                const uint32_t repeats = independent && family[i].f == corner_peak ? 256 : 64;
+                const int skewed = independent && family[i].f == corner_peak;
                 job j = {.name = r->params, .how = MEAN, .f = family[i].f};
                 tally t;
                 char name[80];
@@ -418,7 +419,8 @@ static void genz(void)
                 j.a[1] = parameter(r, "a");
                 j.a[2] = parameter(r, "u");
                 j.exact = r->value + (family[i].f == oscillatory ? 1 : 0);
-                t = repeat(&j, repeats, pt_test_samples(n), kinds[k], seed);
+                t = repeat(&j, skewed ? 256 : 64, skewed ? pt_test_all_samples(n) : pt_test_samples(n),
+                           kinds[k], seed);
                 sprintf(name, "%s %s, %s", r->id, family[i].quantity, names[k]);
                 pt_check_mean(name, &t.units, j.exact, 0, 0.1, independent ? PT_TEST_VALUES : PT_TEST_MEANS,
                               "see pt_estimate_mean");
@@ -501,7 +503,7 @@ static void peaks(void)
     double a[2], wide[2];
     const pt_technique same = {tangent_warp, tangent_density, a},
                        wider = {tangent_warp, tangent_density, wide};
-    pt_integral p = {lorentzian, a, 1, pt_test_samples(1u << 18), PT_SAMPLER_INDEPENDENT, 0};
+    pt_integral p = {lorentzian, a, 1, pt_test_samples(1u << 18), PT_SAMPLER_INDEPENDENT, pt_test_seed(99)};
     power_law linear = {1, 10};
     const pt_technique corner = {power_warp, power_density, &linear};
     const row *r;
@@ -1497,7 +1499,7 @@ static double p_values[P_VALUES];
 static void p_of_means(void)
 {
     pt_pcg32 rng = pt_pcg32_make(pt_test_seed(410000), 1);
-    const uint32_t n = pt_test_samples(P_VALUES);
+    const uint32_t n = pt_test_all_samples(P_VALUES);
     uint32_t i;
     for (i = 0; i < n; i++) {
         const pt_stats s = normal_sample(&rng, 5, 7, 2);
@@ -1530,7 +1532,7 @@ static void p_of_counts(void)
 {
     static const double expected[9] = {4, 4, 4, 52, 256, 1024, 2048, 4796, 4};
     pt_pcg32 rng = pt_pcg32_make(pt_test_seed(420000), 1);
-    const uint32_t n = pt_test_samples(4096);
+    const uint32_t n = pt_test_all_samples(4096);
     double observed[9];
     uint32_t i;
     for (i = 0; i < n; i++) {
@@ -1567,7 +1569,7 @@ static void coverage(void)
 {
     static const double confidence[2] = {0.5, 0.8};
     pt_pcg32 rng = pt_pcg32_make(pt_test_seed(440000), 1);
-    const uint32_t n = pt_test_samples(1u << 14);
+    const uint32_t n = pt_test_all_samples(1u << 14);
     pt_stats covered[2] = {{0, 0, 0, 0}, {0, 0, 0, 0}};
     uint32_t i;
     int c;
@@ -1587,7 +1589,7 @@ static double scatter(double n, double kurtosis) { return sqrt((kurtosis - (n - 
 /* The kurtosis of uniform numbers is 1.8. */
 static void variance_of_variance(void)
 {
-    const uint32_t runs = pt_test_samples(1u << 15), n = 512;
+    const uint32_t runs = pt_test_all_samples(1u << 15), n = 512;
     const double exact = scatter(n, 1.8);
     const row *r;
     pt_stats squares = PT_STATS_INIT;

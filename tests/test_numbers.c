@@ -938,11 +938,11 @@ static void other_estimators_refuse(void)
 static void jittered_variance(void)
 {
     static const uint32_t counts[3] = {4, 16, 64};
-    const uint32_t sets = pt_test_samples(1u << 14);
+    const uint32_t sets = pt_test_all_samples(1u << 14);
     int c;
     for (c = 0; c < 3; c++) {
         const uint32_t n = counts[c];
-        pt_sampler s = pt_sampler_make(PT_SAMPLER_STRATIFIED, pt_test_seed(50), n);
+        pt_sampler s = pt_sampler_make(PT_SAMPLER_STRATIFIED, pt_test_seed(50 + (uint64_t)c), n);
         pt_stats line = PT_STATS_INIT, square = PT_STATS_INIT;
         uint32_t set, i;
         for (set = 0; set < sets; set++) {

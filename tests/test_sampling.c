@@ -161,7 +161,7 @@ static double one_minus_cos(pt_vec3 w)
 static void cones(void)
 {
     static const double omc[8] = {1e-20, 1e-12, 1e-6, 0.01, 0.5, 1, 1.7, 2};
-    const uint32_t n = pt_test_samples(1u << 16);
+    const uint32_t n = pt_test_all_samples(1u << 16);
     int c, i;
     for (c = 0; c < 8; c++) {
         pt_pcg32 rng = generator((uint64_t)(20 + c));
@@ -773,7 +773,7 @@ static double closed_form(const light_case *l)
 static void one_light(const light_case *l, uint64_t seed)
 {
     const double exact = closed_form(l);
-    const uint32_t n = pt_test_samples(exact > 1e-6 && exact < 0.03 ? 1u << 20 : 1u << 18);
+    const uint32_t n = pt_test_samples(exact > 1e-6 && exact < 0.03 ? 1u << 19 : 1u << 16);
     const pt_vec3 o = pt_v3(0, 0, 0);
     pt_pcg32 rng = generator(seed);
     pt_scene scene = PT_SCENE_INIT;
@@ -822,7 +822,7 @@ static void irradiance(void)
 /* Random directions find the light with the density that pt_light_pdf_w says: it integrates to 1. */
 static void light_densities(void)
 {
-    const uint32_t n = pt_test_samples(1u << 18);
+    const uint32_t n = pt_test_all_samples(1u << 18);
     int k;
     for (k = 0; k < LIGHTS; k++) {
         const light_case *const l = &lights[k];
@@ -1005,7 +1005,7 @@ static void choice_by_power(void)
 /* Each emitted ray carries L cos / (pdf_a pdf_w): the mean is the power, pi A L for each side. */
 static void emitted_power(void)
 {
-    const uint32_t n = pt_test_samples(1u << 14);
+    const uint32_t n = pt_test_all_samples(1u << 14);
     int k;
     for (k = 0; k < LIGHTS; k++) {
         const light_case *const l = &lights[k];
