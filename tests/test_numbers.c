@@ -938,7 +938,7 @@ static void other_estimators_refuse(void)
 static void jittered_variance(void)
 {
     static const uint32_t counts[3] = {4, 16, 64};
-    const uint32_t sets = pt_test_all_samples(1u << 14);
+    const uint32_t sets = pt_test_all_samples(1u << 15);
     int c;
     for (c = 0; c < 3; c++) {
         const uint32_t n = counts[c];

@@ -258,7 +258,7 @@ static void roulette_path_length(void)
     experiment e = experiment_of(&scene, *furnace_ray(), PLAIN);
     pt_sampler sampler = pt_sampler_make(PT_SAMPLER_INDEPENDENT, pt_test_seed(170), 0);
     pt_stats edges = PT_STATS_INIT, square = PT_STATS_INIT;
-    const uint32_t n = pt_test_samples(1300000);
+    const uint32_t n = pt_test_all_samples(1300000);
     uint32_t i, strange = 0;
     e.options.roulette = PT_ROULETTE_CONSTANT;
     e.options.roulette_survival = (pt_real)0.5;
