@@ -85,7 +85,8 @@ static inline void pt_test_begin(const char *program, int argc, char **argv)
     pt_test.clock = pt_cpu_seconds();
     setvbuf(stdout, NULL, _IOLBF, BUFSIZ);
     if (pt_test.is_short) printf("%s: SHORT=1, power bounds are not enforced\n", program);
-    if (pt_test.is_seeded) printf("%s: SEED is set, statistical checks alone, a quarter of the samples\n", program);
+    if (pt_test.is_seeded)
+        printf("%s: SEED is set, statistical checks alone, a quarter of the samples\n", program);
 }
 
 /* Counts one check; returns the word its line begins with. */
@@ -237,7 +238,8 @@ static inline void pt_test_judge(const char *name, const pt_judged_mean *m, doub
         why = "the check could have missed a bias above its bound: take more samples. ";
     if (accepted == reject) why = reject ? "the wrong value was not noticed. " : "the value is wrong. ";
     if (!valid) why = "invalid: too few samples, or too skewed ones. ";
-    printf("%s %-48s n %-8.0f got %-12.8g exact %-12.8g se %-8.2g z %+6.2f  sees %.3g%s (bound %g)  %s  %.2f s\n",
+    printf("%s %-48s n %-8.0f got %-12.8g exact %-12.8g se %-8.2g z %+6.2f  sees %.3g%s (bound %g)  %s  %.2f "
+           "s\n",
            pt_test_count(why[0] == '\0'), name, m->n, m->value, m->exact, m->se, z,
            relative ? 100 * sees : sees, relative ? " %" : "", relative ? 100 * bound : bound, p_text,
            pt_test_lap());
@@ -253,8 +255,10 @@ static inline void pt_test_judge_mean(const char *name, const pt_stats *s, doubl
     pt_judged_mean m = {s->n, s->mean, exact, 0, 0, 0, 0};
     m.se = sqrt(se * se + exact_error * exact_error + rounding * rounding);
     m.own = m.se > 0 ? se / m.se : 0;
-    if (df_mode == PT_TEST_MEANS) m.df = s->n - 1;
-    else if (se > 0) m.skewness = pt_stats_skewness(s) / sqrt(s->n) * pow(se / m.se, 3);
+    if (df_mode == PT_TEST_MEANS)
+        m.df = s->n - 1;
+    else if (se > 0)
+        m.skewness = pt_stats_skewness(s) / sqrt(s->n) * pow(se / m.se, 3);
     pt_test_judge(name, &m, bound, reject, hint);
 }
 
@@ -313,11 +317,14 @@ static inline void pt_test_judge_chi2(const char *name, const double *observed, 
     pt_test.statistical++;
     if (pt_test_skip(name, df < 1 || (reject && p >= pt_test_level()))) return;
     printf("%s %-48s n %-8.0f expected %-12.9g chi2 %-10.6g df %-6d %s  %.2f s\n",
-           pt_test_count(df >= 1 && (p >= pt_test_level()) != reject), name, total_o, total_e, chi2, df, p_text,
-           pt_test_lap());
-    if (df < 1) printf("       invalid: fewer than two cells expect 100 samples. %s\n", hint);
-    else if (impossible && !reject) printf("       samples where the density is zero, or lost. %s\n", hint);
-    else if ((p >= pt_test_level()) == reject) printf("       %s\n", hint);
+           pt_test_count(df >= 1 && (p >= pt_test_level()) != reject), name, total_o, total_e, chi2, df,
+           p_text, pt_test_lap());
+    if (df < 1)
+        printf("       invalid: fewer than two cells expect 100 samples. %s\n", hint);
+    else if (impossible && !reject)
+        printf("       samples where the density is zero, or lost. %s\n", hint);
+    else if ((p >= pt_test_level()) == reject)
+        printf("       %s\n", hint);
 }
 
 /* Do counts follow expectations? pt_check_rejects_chi2 passes only if a difference is found. */
@@ -345,11 +352,12 @@ static inline void pt_test_uniform(void)
     p = fmin(2 * exp(-2 * n * distance * distance), 1);
     ok = p >= pt_test_level();
     pt_test.statistical++;
-    printf("%s %-48s n %-8d distance %-8.3g (p %.3g)\n", pt_test_count(ok), "p-values are uniform", n, distance,
-           p);
+    printf("%s %-48s n %-8d distance %-8.3g (p %.3g)\n", pt_test_count(ok), "p-values are uniform", n,
+           distance, p);
     if (!ok)
-        printf("       too many small p-values: standard errors are too small, or something is biased; too few: "
-               "standard errors are too large, or samples are not independent\n");
+        printf(
+            "       too many small p-values: standard errors are too small, or something is biased; too few: "
+            "standard errors are too large, or samples are not independent\n");
 }
 
 static inline int pt_test_end(void)

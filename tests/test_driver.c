@@ -524,11 +524,16 @@ static void first_hits(void)
         film = render(&s, &d);
         pt_check(film.albedo && film.normal && film.depth, "first hits are stored", "they are not");
         if (film.albedo && film.normal && film.depth) {
-            pt_check_near("albedo", film.albedo[3] / 8, wall ? 0.25 : 0, 1e-6, "");
-            pt_check_near("albedo, blue", film.albedo[5] / 8, wall ? 0.75 : 0, 1e-6, "");
-            pt_check_near("normal, z", film.normal[17] / 8, wall ? 1 : 0, 1e-6, "");
-            pt_check_near("normal, x", film.normal[15] / 8, 0, 1e-6, "");
-            pt_check_near("depth", film.depth[5] / 8, wall ? 2 : 0, 1e-5, "");
+            pt_check_near("albedo", film.albedo[3] / 8, wall ? 0.25 : 0, 1e-6,
+                          "the sum over samples of the albedo at the first hit, not of the radiance");
+            pt_check_near("albedo, blue", film.albedo[5] / 8, wall ? 0.75 : 0, 1e-6,
+                          "are the three bands in their order?");
+            pt_check_near("normal, z", film.normal[17] / 8, wall ? 1 : 0, 1e-6,
+                          "the normal of the first hit, towards the camera");
+            pt_check_near("normal, x", film.normal[15] / 8, 0, 1e-6,
+                          "the normal of the first hit: x, y, z in their order");
+            pt_check_near("depth", film.depth[5] / 8, wall ? 2 : 0, 1e-5,
+                          "the distance along the ray, not along the axis of the camera");
         }
         pt_film_free(&film);
         d.aov = 0;
@@ -599,9 +604,12 @@ static void error_figures(void)
     pt_check_near("estimated relmse", e.relmse, re, 1e-12,
                   "relative to R^2 + (mean luminance / 10)^2, R the picture itself");
     pt_check_near("estimated relmse_001", e.relmse_001, pe, 1e-12, "relative to R^2 + 0.01");
-    pt_check_near("true rmse", t.rmse, sqrt(st), 1e-12, "");
-    pt_check_near("true relmse", t.relmse, rt, 1e-12, "");
-    pt_check_near("true relmse_001", t.relmse_001, pt, 1e-12, "");
+    pt_check_near("true rmse", t.rmse, sqrt(st), 1e-12,
+                  "the root of the mean over pixels and bands of (a - b)^2");
+    pt_check_near("true relmse", t.relmse, rt, 1e-12,
+                  "each square relative to R^2 + (mean luminance / 10)^2 of the reference, not of the film");
+    pt_check_near("true relmse_001", t.relmse_001, pt, 1e-12,
+                  "each square relative to R^2 + 0.01 of the reference, not of the film");
     f.samples[1] = 0;
     pt_check(pt_film_error_estimate(&f, &e) == 0, "estimate from one half", "claims to be known");
     pt_film_free(&f);
@@ -651,7 +659,8 @@ static void reports(void)
     pt_check(pt_render(&s.scene, &d, &film, &r) == PT_OK, "report with a reference", "no render");
     check_rows(&r, 8, 1);
     pt_film_error(&film, reference, &last);
-    pt_check_near("report, true rmse", r.rows[r.row_count - 1].true_error.rmse, last.rmse, 0, "");
+    pt_check_near("report, true rmse", r.rows[r.row_count - 1].true_error.rmse, last.rmse, 0,
+                  "the last row must be about the finished film");
     pt_check_near("report, true relmse_001", r.rows[r.row_count - 1].true_error.relmse_001,
                   last.relmse_001 - 1e-4, 1e-15, "the reference's own error is to be subtracted");
     pt_film_free(&film);

@@ -250,14 +250,22 @@ static pt_result run(const job *original, uint32_t n, pt_sampler_kind kind, uint
                                {power_warp, power_density, &j.law[1]}};
     const pt_integral p = {j.f, j.a, j.dimensions, n, kind, pt_test_seed(seed)};
     switch (j.how) {
-    case MEAN: return pt_estimate_mean(&p, out);
-    case ANTITHETIC: return pt_estimate_antithetic(&p, out);
-    case IMPORTANCE: return pt_estimate_importance(&p, t, out);
-    case CONTROL: return pt_estimate_control(&p, j.g, j.g_integral, j.c, out);
-    case MIS: return pt_estimate_mis(&p, t, j.counts, 2, j.heuristic, out);
-    case MIS_ONE: return pt_estimate_mis_one(&p, t, j.shares, 2, j.heuristic, out);
-    case ROULETTE: return pt_estimate_roulette(&p, j.q, out);
-    case SPLITTING: return pt_estimate_splitting(&p, j.outer, j.splits, out);
+    case MEAN:
+        return pt_estimate_mean(&p, out);
+    case ANTITHETIC:
+        return pt_estimate_antithetic(&p, out);
+    case IMPORTANCE:
+        return pt_estimate_importance(&p, t, out);
+    case CONTROL:
+        return pt_estimate_control(&p, j.g, j.g_integral, j.c, out);
+    case MIS:
+        return pt_estimate_mis(&p, t, j.counts, 2, j.heuristic, out);
+    case MIS_ONE:
+        return pt_estimate_mis_one(&p, t, j.shares, 2, j.heuristic, out);
+    case ROULETTE:
+        return pt_estimate_roulette(&p, j.q, out);
+    case SPLITTING:
+        return pt_estimate_splitting(&p, j.outer, j.splits, out);
     }
     return PT_ERROR_ARGUMENT;
 }
@@ -421,8 +429,9 @@ static void genz(void)
                 t = repeat(&j, skewed ? 256 : 64, skewed ? pt_test_all_samples(n) : pt_test_samples(n),
                            kinds[k], seed);
                 sprintf(name, "%s %s, %s", r->id, family[i].quantity, names[k]);
-                pt_check_mean(name, &t.units, j.exact, 0, 0.1, independent ? PT_TEST_VALUES : PT_TEST_MEANS,
-                              "see pt_estimate_mean");
+                pt_check_mean(
+                    name, &t.units, j.exact, 0, 0.1, independent ? PT_TEST_VALUES : PT_TEST_MEANS,
+                    "the sum must be divided by n; do the points fill the unit cube, all of its dimensions?");
             }
         }
 }
@@ -492,7 +501,8 @@ static void second_moments(void)
         if (isinf(r->value)) continue;
         j.a[0] = j.law[0].q = 2 * p - q;
         run(&j, 1000, PT_SAMPLER_INDEPENDENT, 2, &e);
-        pt_check_near(r->id, e.value / (q + 1) - mean * mean, r->value, 1e-14, "see pt_estimate_importance");
+        pt_check_near(r->id, e.value / (q + 1) - mean * mean, r->value, 1e-14,
+                      "f / p at the warped point, p the density of that technique there");
     }
 }
 
@@ -515,12 +525,13 @@ static void peaks(void)
         a[1] = parameter(r, "e");
         wide[1] = 2 * a[1];
         pt_estimate_importance(&p, &wider, &e);
-        pt_check_mean(r->id, &e.units, r->value, 0, 0.02, PT_TEST_VALUES, "see pt_estimate_importance");
+        pt_check_mean(r->id, &e.units, r->value, 0, 0.02, PT_TEST_VALUES,
+                      "f / p: is p the density at x, normalised over the interval?");
         p.f = lorentzian_squared;
         p.seed = pt_test_seed(100 + (uint64_t)at);
         pt_estimate_importance(&p, &same, &e);
         pt_check_mean("its second moment", &e.units, variance + r->value * r->value, 0, 0.02, PT_TEST_VALUES,
-                      "see pt_estimate_importance");
+                      "f^2 / p by the technique that samples f itself: p must be normalised");
         p.f = lorentzian;
         pt_estimate_importance(&p, &same, &e);
         exactly("a peak sampled by itself", &e, r->value, 1e-9); /* x - c cancels near the peak */
@@ -532,7 +543,7 @@ static void peaks(void)
     pt_estimate_importance(&p, &corner, &e);
     pt_check_mean("second moment of ten factors", &e.units,
                   find_row("MC-ND", "prod_Var", "d=10")->value + mean * mean, 0, 0.03, PT_TEST_VALUES,
-                  "see pt_estimate_importance");
+                  "in ten dimensions the density is the product of ten");
 }
 
 /* ---------------------------------------------------------------------------------------------------------
@@ -582,7 +593,8 @@ static void heavy_tails(void)
         t = repeat(&j, REPEATS, pt_test_samples(1024), PT_SAMPLER_INDEPENDENT, 69000);
         /* Its skewness is 7.07, little for so many values; seen in the values it would jump about, as their
            sixth moment is infinite. */
-        pt_check_mean("mean: x^-0.25", &t.units, j.exact, 0, 0.02, PT_TEST_MEANS, "see pt_estimate_mean");
+        pt_check_mean("mean: x^-0.25", &t.units, j.exact, 0, 0.02, PT_TEST_MEANS,
+                      "large values near 0 are rare, yet they count: is u = 0 left out, or cut off?");
     }
     j.how = IMPORTANCE; /* q = 5 is infinite: x^-3 / 6 where density 6 x^5 hardly ever goes */
     j.a[0] = 2;
@@ -1152,9 +1164,9 @@ typedef struct order_case {
     spread of;
     const job *j;
     uint32_t n;
-    double order;   /* theory, for large n            */
-    double at_16;   /* exact variance for 16 points,  */
-    double at_256;  /* and for 256; 0: of order n^-1  */
+    double order;  /* theory, for large n            */
+    double at_16;  /* exact variance for 16 points,  */
+    double at_256; /* and for 256; 0: of order n^-1  */
 } order_case;
 
 static void one_order(const order_case *o, int too_slow, uint64_t seed)
@@ -1358,7 +1370,8 @@ static void maximum_heuristic(void)
     const pt_heuristic h = PT_HEURISTIC_MAXIMUM;
     pt_check(pt_mis_weight(2, 1, h) == 1 && pt_mis_weight(1, 2, h) == 0, "maximum heuristic",
              "all to the larger density");
-    pt_check(pt_mis_weight(1, 1, h) > 0.49 && pt_mis_weight(1, 1, h) < 0.51, "maximum heuristic", "equal densities share");
+    pt_check(pt_mis_weight(1, 1, h) > 0.49 && pt_mis_weight(1, 1, h) < 0.51, "maximum heuristic",
+             "equal densities share");
     pt_check(pt_mis_weight(0, 0, h) == 0 && pt_mis_weight(0, 1, h) == 0, "maximum heuristic",
              "density 0 gives 0");
 }
@@ -1430,7 +1443,8 @@ static void wrong_estimators(void)
         if (i > 1)
             expect_wrong(names[i], &e);
         else
-            pt_check_mean(names[i], &e.units, 1.0 / 3, 0, 0.05, PT_TEST_VALUES, "see pt_mis_weight");
+            pt_check_mean(names[i], &e.units, 1.0 / 3, 0, 0.05, PT_TEST_VALUES,
+                          "at each point the weights of the techniques must sum to 1");
     }
     p.f = power_of;
     p.dimensions = 1;
@@ -1545,7 +1559,8 @@ static void p_values_by_hand(void)
     pt_check(pt_p_value_counts(expected, expected, 6) == 1, "counts as expected", "p must be 1");
     pt_check(pt_p_value_counts(few, few, 3) == 1, "too few for two cells", "p must be 1");
     pt_check(isinf(pt_stats_interval(&one, 0.9)), "interval of one value", "must be infinite");
-    pt_check_near("interval without spread", pt_stats_interval(&same, 0.9), 0, 0, "see pt_stats_interval");
+    pt_check_near("interval without spread", pt_stats_interval(&same, 0.9), 0, 0,
+                  "t times standard error: without spread both ends are the mean");
     near_relative("interval, two degrees of freedom", pt_stats_interval(&s, 0.9),
                   0.9 * sqrt(2 / (1 - 0.81)) * sqrt(7) / 3, 1e-12); /* t = c sqrt(2 / (1 - c^2)) */
 }
@@ -1678,7 +1693,9 @@ static void coverage(void)
     }
     for (c = 0; c < 2; c++)
         pt_check_mean("coverage of intervals of four values", &covered[c], confidence[c], 0, 0.1,
-                      PT_TEST_VALUES, "see pt_stats_interval");
+                      PT_TEST_VALUES,
+                      "Student's t with n - 1 degrees of freedom, not the normal quantile: with n = 4 they "
+                      "differ much");
 }
 
 /* How far sample variances of n values scatter, relative to the variance: this depends on the kurtosis. */
@@ -1701,8 +1718,9 @@ static void variance_of_variance(void)
         for (k = 0; k < n; k++) pt_stats_add(&s, pt_pcg32_double(&rng));
         pt_stats_add(&squares, pow(12 * pt_stats_variance(&s) - 1, 2));
     }
-    pt_check_mean("scatter of sample variances, squared", &squares, exact * exact, 0, 0.1, PT_TEST_VALUES,
-                  "see pt_stats_variance");
+    pt_check_mean(
+        "scatter of sample variances, squared", &squares, exact * exact, 0, 0.1, PT_TEST_VALUES,
+        "divide by n - 1; the scatter of a variance depends on the kurtosis, 1.8 for uniform numbers");
 }
 
 int main(int argc, char **argv)

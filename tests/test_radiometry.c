@@ -84,8 +84,10 @@ static int numbers(const row *r, const char *key, double *out, int max)
     while (at && *at && *at != ';' && n < max) {
         char *end;
         out[n] = strtod(at, &end);
-        if (end == at) at++;
-        else n++, at = end;
+        if (end == at)
+            at++;
+        else
+            n++, at = end;
     }
     return n;
 }
@@ -332,8 +334,10 @@ static void directions_in_caps(void)
 static void add_facing(pt_scene *scene, pt_vec3 a, pt_vec3 b, pt_vec3 c, int material)
 {
     const pt_vec3 n = pt_v3_cross(pt_v3_sub(b, a), pt_v3_sub(c, a));
-    if (dot(n, a) < 0) pt_add_triangle(scene, a, b, c, material);
-    else pt_add_triangle(scene, a, c, b, material);
+    if (dot(n, a) < 0)
+        pt_add_triangle(scene, a, b, c, material);
+    else
+        pt_add_triangle(scene, a, c, b, material);
 }
 
 static void solid_angles_of_flat_shapes(void)
@@ -351,8 +355,10 @@ static void solid_angles_of_flat_shapes(void)
             numbers(r, corner[i], n, 3);
             v[i] = hundredfold(n);
         }
-        near_relative(row_label(r->id, "closed"), pt_solid_angle_triangle(o, v[0], v[1], v[2]), r->value, 2e-15);
-        near_relative(row_label(r->id, "turned"), pt_solid_angle_triangle(o, v[2], v[1], v[0]), r->value, 2e-15);
+        near_relative(row_label(r->id, "closed"), pt_solid_angle_triangle(o, v[0], v[1], v[2]), r->value,
+                      2e-15);
+        near_relative(row_label(r->id, "turned"), pt_solid_angle_triangle(o, v[2], v[1], v[0]), r->value,
+                      2e-15);
         near_relative(row_label(r->id, "polygon"), pt_solid_angle_polygon(o, v, 3), r->value, 2e-15);
         add_facing(&scene, v[0], v[1], v[2], lamp(&scene, 1));
         check_lamp(r, &scene);
@@ -435,8 +441,8 @@ static void disks(void)
         below.p.x = real(d.offset);
         below.scene = &scene;
         near_relative(row_label(r->id, "closed"), pt_irradiance_disk(1, d.r, d.h, d.offset), r->value, 3e-15);
-        check_bound(row_label(r->id, "by area"), disk_irradiance, &d, d.h < 0.5 ? 16 * POINTS : POINTS, r->value,
-                    0, BOUND, "cos cos / d^2 over pt_warp_disk");
+        check_bound(row_label(r->id, "by area"), disk_irradiance, &d, d.h < 0.5 ? 16 * POINTS : POINTS,
+                    r->value, 0, BOUND, "cos cos / d^2 over pt_warp_disk");
         add_disk(&scene, d.r, d.h, 0, lamp(&scene, 1));
         commit(&scene);
         check_irradiance(r->id, &below, d.h < 0.5 ? 4 * POINTS : POINTS, r->value, 1e-4);
@@ -505,16 +511,17 @@ static void spots(void)
         for (k = -1; k < 6; k++) {
             const double x = 0.25 * k, c = lit.cos_end + x * (lit.cos_start - lit.cos_end);
             pt_check_near(row_label(r->id, "falloff"), pt_spot_falloff(c, lit.cos_start, lit.cos_end),
-                          falloff[k + 1], 1e-13, "see pt_spot_falloff");
+                          falloff[k + 1], 1e-13,
+                          "smooth between the two cosines: t^2 (3 - 2 t), clamped to 0 and 1");
         }
-        near_relative(row_label(r->id, "closed"), pt_flux_spot(intensity, lit.cos_start, lit.cos_end), r->value,
-                      1e-14);
+        near_relative(row_label(r->id, "closed"), pt_flux_spot(intensity, lit.cos_start, lit.cos_end),
+                      r->value, 1e-14);
         pt_add_point_light(&scene, v3(0.5, -0.25, 1), grey(intensity));
         commit(&scene);
         lit.scene = &scene;
         /* 1 - cos of 12 degrees, computed from a cosine, and cosines of single precision in its falloff */
-        check(row_label(r->id, "through a sphere"), flux_through_sphere, &lit, r->value, is_float() ? 1e-5 : 0,
-              "pt_spot_falloff or the point light");
+        check(row_label(r->id, "through a sphere"), flux_through_sphere, &lit, r->value,
+              is_float() ? 1e-5 : 0, "pt_spot_falloff or the point light");
         pt_scene_free(&scene);
     }
 }
@@ -529,7 +536,8 @@ static void sphere_lights(void)
         pt_scene scene = PT_SCENE_INIT;
         receiver below = {NULL, {0, 0, 0}, {0, 0, 1}};
         /* cos(90 degrees) is 6e-17 here, and E at a small sphere near the horizon has a slope of 1 / cos */
-        near_relative(row_label(r->id, "closed"), pt_irradiance_sphere(1, radius, d, cos(beta)), r->value, 1e-13);
+        near_relative(row_label(r->id, "closed"), pt_irradiance_sphere(1, radius, d, cos(beta)), r->value,
+                      1e-13);
         below.scene = &scene;
         pt_add_sphere(&scene, v3(d * sin(beta), 0, d * cos(beta)), real(radius), lamp(&scene, 1));
         commit(&scene);
@@ -549,8 +557,10 @@ static void check_polygon(const row *r, const double (*v)[3], int count, int as_
     int i;
     if (as_parallelogram) {
         const pt_vec3 e1 = pt_v3_sub(b, a), e2 = pt_v3_sub(v3(v[3][0], v[3][1], v[3][2]), a);
-        if (dot(pt_v3_cross(e1, e2), a) < 0) pt_add_parallelogram(&scene, a, e1, e2, material);
-        else pt_add_parallelogram(&scene, a, e2, e1, material);
+        if (dot(pt_v3_cross(e1, e2), a) < 0)
+            pt_add_parallelogram(&scene, a, e1, e2, material);
+        else
+            pt_add_parallelogram(&scene, a, e2, e1, material);
     }
     for (i = 1; i + 1 < count && !as_parallelogram; i++)
         add_facing(&scene, a, v3(v[i][0], v[i][1], v[i][2]), v3(v[i + 1][0], v[i + 1][1], v[i + 1][2]),
@@ -603,8 +613,8 @@ static void regular_polygons(void)
         }
         near_relative(row_label(r->id, "triangles"), sum, r->value, tolerance);
         if (n <= 32)
-            near_relative(row_label(r->id, "closed"), pt_irradiance_polygon(1, v3(0, 0, 0), v3(0, 0, 1), v, n),
-                          r->value, tolerance);
+            near_relative(row_label(r->id, "closed"),
+                          pt_irradiance_polygon(1, v3(0, 0, 0), v3(0, 0, 1), v, n), r->value, tolerance);
         commit(&scene);
         below.scene = &scene;
         check_irradiance(r->id, &below, POINTS, r->value, 0);
@@ -703,7 +713,8 @@ static void bulb(const row *r, double intensity)
     const double radius = 0.03, flux = parameter(r, "Phi_lm"), d = 2;
     pt_scene scene = PT_SCENE_INIT;
     receiver below = {NULL, {0, 0, 0}, {0, 1, 0}};
-    near_relative(row_label(r->id, "closed"), pt_exitance(r->value) * 4 * PT_PI * radius * radius, flux, 1e-15);
+    near_relative(row_label(r->id, "closed"), pt_exitance(r->value) * 4 * PT_PI * radius * radius, flux,
+                  1e-15);
     near_relative(row_label(r->id, "illuminance"), pt_irradiance_sphere(r->value, radius, d, 1),
                   pt_irradiance_point(intensity, d, 1), 1e-14);
     pt_add_sphere(&scene, v3(0, d, 0), real(radius), lamp(&scene, r->value));
@@ -723,7 +734,7 @@ static void photometry(void)
     int at = 0;
     pt_cie_xyz(nm, bar);
     pt_check_near("683 lm/W at 540 THz", PT_LUMENS_PER_WATT * bar[1], 683, 683 * 1e-5,
-                  "see PT_LUMENS_PER_WATT");
+                  "lm/W at 555 nm; a weight by ybar must follow");
     while ((r = next_row("RAD-PHOT", NULL, &at)) != NULL) {
         const double flux = parameter(r, "Phi_lm");
         if (strcmp(r->quantity, "I_cd") == 0) {
@@ -772,8 +783,10 @@ static double peak(double kelvin)
     int i;
     for (i = 0; i < 60; i++) {
         const double x = b - golden * (b - a), y = a + golden * (b - a);
-        if (pt_blackbody(x, kelvin) < pt_blackbody(y, kelvin)) a = x;
-        else b = y;
+        if (pt_blackbody(x, kelvin) < pt_blackbody(y, kelvin))
+            a = x;
+        else
+            b = y;
     }
     return 0.5 * (a + b);
 }
@@ -805,8 +818,9 @@ static void black_bodies(void)
             near_relative(r->id, pt_blackbody(peak(t), t) * 1e9, r->value, 2e-14);
         } else {
             near_relative(r->id, integrated_band(t, 360, 830) / exitance, r->value, 1e-12);
-            check(row_label(r->id, "by wavelengths"), one_wavelength, &t, r->value * exitance, 0,
-                  "see pt_blackbody");
+            check(
+                row_label(r->id, "by wavelengths"), one_wavelength, &t, r->value * exitance, 0,
+                "Planck: 2 h c^2 / lambda^5 / (exp(h c / (lambda k T)) - 1), times 1e-9 to be per nanometre");
         }
     }
 }
@@ -823,8 +837,8 @@ static void luminous_efficacy(void)
             pt_cie_xyz(360 + 0.01 * i, bar);
             sum += bar[1] * pt_blackbody(360 + 0.01 * i, t) * 0.01;
         }
-        near_relative(row_label(r->id, "efficacy"), pt_blackbody_efficacy(t), 683.002 * PT_PI * sum / r->value,
-                      1e-4);
+        near_relative(row_label(r->id, "efficacy"), pt_blackbody_efficacy(t),
+                      683.002 * PT_PI * sum / r->value, 1e-4);
     }
     pt_check_near("a light bulb of 2700 K", pt_blackbody_efficacy(2700), 12.4, 0.1, "lm/W");
 }
@@ -844,14 +858,14 @@ static void colours(void)
         xyz[axis] = r->value;
         if (axis == 1)
             pt_check_near(row_label(r->id, "luminance"), pt_luminance(band == 'R', band == 'G', band == 'B'),
-                          r->value, unit * r->value, "see pt_luminance");
+                          r->value, unit * r->value, "0.2126, 0.7152, 0.0722 of linear sRGB: no gamma");
         if (axis == 2) {
             const pt_rgbd c = pt_xyz_to_rgb(xyz);
             const double got[3] = {c.r, c.g, c.b};
             int k;
             for (k = 0; k < 3; k++)
                 pt_check_near(row_label(r->id, "to linear sRGB"), got[k], bands[k] == band, 2 * unit,
-                              "see pt_xyz_to_rgb");
+                              "the matrix of sRGB with white D65, rows not columns");
         }
     }
     for (at = 0; (r = next_row("RAD-SRGBTF", "encoded", &at)) != NULL;)
@@ -917,15 +931,14 @@ static void rectangles(void)
     near_relative("squares far apart", 1e12 * PT_PI * pt_form_factor_parallel(1, 1, 1e6), 1, 1e-11);
     for (at = 0; (r = next_row("VF-PAR", "F12", &at)) != NULL;) {
         const double a = parameter(r, "a"), b = parameter(r, "b"), c = parameter(r, "c");
-        near_relative(row_label(r->id, "closed"), pt_form_factor_parallel(a, b, c), r->value,
-                      2e-14);
+        near_relative(row_label(r->id, "closed"), pt_form_factor_parallel(a, b, c), r->value, 2e-14);
         check_form_factor(r, on_floor(0, a, 0, b), v3(0, c, 0), v3(a, 0, 0), v3(0, 0, b));
     }
     for (at = 0; (r = next_row("VF-PERP", "F12", &at)) != NULL;) {
         const double w = parameter(r, "w"), h = parameter(r, "h"), l = parameter(r, "l");
         near_relative(row_label(r->id, "closed"), pt_form_factor_perpendicular(w, h, l), r->value, 2e-14);
-        near_relative(row_label(r->id, "reciprocity"), pt_form_factor_perpendicular(h, w, l) * h / w, r->value,
-                      2e-14);
+        near_relative(row_label(r->id, "reciprocity"), pt_form_factor_perpendicular(h, w, l) * h / w,
+                      r->value, 2e-14);
         check_form_factor(r, on_floor(0, w, 0, l), v3(0, 0, 0), v3(0, h, 0), v3(0, 0, l));
     }
 }
@@ -1019,7 +1032,8 @@ static void coaxial_disks(void)
         from.r = parameter(r, "r1");
         from.r2 = parameter(r, "r2");
         from.h = parameter(r, "h");
-        near_relative(row_label(r->id, "closed"), pt_form_factor_disks(from.r, from.r2, from.h), r->value, 2e-15);
+        near_relative(row_label(r->id, "closed"), pt_form_factor_disks(from.r, from.r2, from.h), r->value,
+                      2e-15);
         check(row_label(r->id, "irradiance"), mean_irradiance, &from, r->value, 0,
               "the mean of pt_irradiance_disk");
         add_disk(&scene, from.r2, from.h, 0, lamp(&scene, 1));
@@ -1055,8 +1069,8 @@ static void sphere_and_disk(void)
         const double radius = parameter(r, "r"), h = parameter(r, "h");
         pt_scene scene = PT_SCENE_INIT;
         near_relative(row_label(r->id, "closed"), pt_form_factor_sphere_disk(radius, h), r->value, 1e-15);
-        near_relative(row_label(r->id, "solid angle"), pt_solid_angle_disk(radius, h, 0) / (4 * PT_PI), r->value,
-                      1e-15);
+        near_relative(row_label(r->id, "solid angle"), pt_solid_angle_disk(radius, h, 0) / (4 * PT_PI),
+                      r->value, 1e-15);
         pt_add_sphere(&scene, v3(0, 0, 0), real(0.5 * h), lamp(&scene, 2));
         add_disk(&scene, radius, h, 0, wall(&scene, 0));
         commit(&scene);
@@ -1180,8 +1194,8 @@ static void closed_cylinders(void)
         near_relative(row_label(r->id, "closed"), sideways ? 1 - c.r / c.h * (1 - across) : across, r->value,
                       1e-14);
         make_cylinder(&c);
-        check_hits(row_label(r->id, "rays"), sideways ? side_to_side : base_to_top, &c, r->value, r->value, 1e-4,
-                   "rays within a closed cylinder");
+        check_hits(row_label(r->id, "rays"), sideways ? side_to_side : base_to_top, &c, r->value, r->value,
+                   1e-4, "rays within a closed cylinder");
         pt_scene_free(&c.scene);
     }
 }

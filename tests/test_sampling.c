@@ -147,7 +147,9 @@ static void warps(void)
         if (k == IN_BALL || k == POLAR)
             pt_check_rejects_chi2(warp_names[k], counts, expected, 256, "this density is not the right one");
         else
-            pt_check_chi2(warp_names[k], counts, expected, 256, "see [PT-04]");
+            pt_check_chi2(warp_names[k], counts, expected, 256,
+                          "do equal areas of u map to equal probabilities? sqrt of u for disks and cosine, z "
+                          "linear in u for spheres");
     }
 }
 
@@ -172,7 +174,9 @@ static void cones(void)
             counts[cell(one_minus_cos(w) / omc[c], 16) * 16 + cell(turn(dbl(w.y), dbl(w.x)), 16)]++;
         }
         pt_check(longest <= unit_slack(), "cone", "directions are not of unit length: off by %g", longest);
-        expect_uniform("cone", counts, 256, "see pt_warp_cone: 1 - cos must be uniform");
+        expect_uniform(
+            "cone", counts, 256,
+            "1 - cos of the angle must be uniform up to 1 - cos of the cone, not the angle itself");
         pt_check_near("density of a cone", pt_warp_cone_pdf_w(omc[c]) * 2 * PT_PI * omc[c], 1, 1e-15,
                       "one over its solid angle");
     }
@@ -297,7 +301,9 @@ static void spherical_triangles(void)
             }
         pt_check(longest <= unit_slack(), seen[t].name, "directions are not of unit length: off by %g",
                  longest);
-        pt_check_chi2(seen[t].name, counts, expected, 128, "see pt_spherical_triangle_sample");
+        pt_check_chi2(
+            seen[t].name, counts, expected, 128,
+            "equal parts of u must be equal solid angles (Arvo): areas by Girard, then along the arc");
     }
 }
 
@@ -342,7 +348,8 @@ static void spherical_rectangles(void)
                 expected[8 * i + j] =
                     n * rectangle(x0 + i * dx, x0 + (i + 1) * dx, y0 + j * dy, y0 + (j + 1) * dy, h) / whole;
         pt_check_near(names[t], made / whole, 1, 1e-9, "solid angle of a rectangle");
-        pt_check_chi2(names[t], counts, expected, 64, "see pt_spherical_rectangle_sample");
+        pt_check_chi2(names[t], counts, expected, 64,
+                      "equal parts of u must be equal solid angles (Urena et al.)");
     }
 }
 
@@ -368,7 +375,10 @@ static void one_alias(const char *name, const double *weights, uint32_t count, u
     }
     pt_check(wrong == 0, name, "%d of %u draws have a wrong or zero probability", wrong, n);
     pt_check_near(name, all, 1, 1e-14, "probabilities must add up to 1");
-    if (count > 1) pt_check_chi2(name, counts, expected, (int)count, "see pti_alias_fill");
+    if (count > 1)
+        pt_check_chi2(
+            name, counts, expected, (int)count,
+            "column i keeps i with its share, else gives its alias: expected counts are n w / sum w");
     pt_alias_free(&table, NULL);
 }
 
@@ -578,13 +588,18 @@ static void fresnel_of_diffuse_light(void)
         pt_stats s = PT_STATS_INIT;
         for (i = 0; i < 64; i++) {
             pt_estimate e;
-            const pt_integral p = {fresnel_integrand, &eta, 1, pt_test_samples(4096), PT_SAMPLER_STRATIFIED,
+            const pt_integral p = {fresnel_integrand,
+                                   &eta,
+                                   1,
+                                   pt_test_samples(4096),
+                                   PT_SAMPLER_STRATIFIED,
                                    pt_test_seed((uint64_t)(200 + i))};
             pt_estimate_mean(&p, &e);
             pt_stats_add(&s, e.value);
         }
         pt_check_mean("reflectance for diffuse light", &s, exact[inside], 5e-10, 0.005, PT_TEST_MEANS,
-                      "see pt_fresnel_dielectric");
+                      "mean of both polarisations, weighted with 2 cos over the hemisphere; 1 beyond the "
+                      "critical angle");
     }
 }
 
@@ -652,11 +667,10 @@ static void glass(void)
         const pt_hit hit = hit_of(n, n);
         const pt_bsdf b = pt_bsdf_make(&zero, &hit);
         pt_bsdf_sample_result s;
-        pt_check(pt_bsdf_sample(&b, n, 0.9, pt_v2(0, 0), PT_RADIANCE, &s) &&
-                     fabs(dbl(s.eta) - 1.5) < 1e-6,
+        pt_check(pt_bsdf_sample(&b, n, 0.9, pt_v2(0, 0), PT_RADIANCE, &s) && fabs(dbl(s.eta) - 1.5) < 1e-6,
                  "glass", "ior 0 stands for 1.5");
-        pt_check(pt_bsdf_sample(&b, n, 0.0399, pt_v2(0, 0), PT_RADIANCE, &s) && dbl(s.eta) == 1,
-                 "glass", "4 %% reflected at 1.5");
+        pt_check(pt_bsdf_sample(&b, n, 0.0399, pt_v2(0, 0), PT_RADIANCE, &s) && dbl(s.eta) == 1, "glass",
+                 "4 %% reflected at 1.5");
         pt_check(dbl(pt_bsdf_eval(&b, n, s.wi, PT_RADIANCE, PT_LOBE_ALL).r) == 0 &&
                      dbl(pt_bsdf_pdf_w(&b, n, s.wi, PT_RADIANCE)) == 0,
                  "glass", "eval and pdf of a delta are 0");
@@ -888,8 +902,7 @@ static void one_sphere_light(const pt_case *c)
         pt_light_sample(&scene, 0, pt_v3(0, 0, 0), pt_v2(real(pt_case_number(c->inputs, "u")), real(0.125)),
                         &s)) {
         const double sint = length3(pt_v3_cross(s.wi, axis));
-        pt_check_near(c->id, 1 / s.pdf_w / omega, 1, rel + 2 * pt_gamma(1),
-                      "solid angle of a sphere light");
+        pt_check_near(c->id, 1 / s.pdf_w / omega, 1, rel + 2 * pt_gamma(1), "solid angle of a sphere light");
         pt_check(dbl(s.wi.z) <= 1 && fabs(length3(s.wi) - 1) <= 4 * pt_gamma(1), c->id, "direction");
         if (pt_case_find(c->expected, "sint", '=')) {
             const double want = pt_case_number(c->expected, "sint");
@@ -982,7 +995,8 @@ static void choice_by_power(void)
         const int k =
             l->kind == PT_LIGHT_POINT ? 3 : (int)((unsigned)"\1\0\2"[scene.primitives[l->primitive].shape]);
         expected[i] = n * power[k] / all;
-        pt_check_near("share of the power", l->pmf, power[k] / all, 1e-6, "see pti_light_power");
+        pt_check_near("share of the power", l->pmf, power[k] / all, 1e-6,
+                      "luminance times area times pi, twice for what shines on both sides");
         sum += l->pmf;
     }
     pt_check_near("shares of the power", sum, 1, 1e-14, "must add up to 1");
@@ -1291,8 +1305,10 @@ static void measurement(void)
                                      ? pdf_w / pt_warp_cone_pdf_w(omc)
                                      : 0);
         }
-        pt_check_mean(k == 0 ? "a pinhole measures radiance" : "a lens measures radiance", &measured, 1, 1e-6,
-                      0.02, PT_TEST_VALUES, "see pt_camera_we");
+        pt_check_mean(
+            k == 0 ? "a pinhole measures radiance" : "a lens measures radiance", &measured, 1, 1e-6, 0.02,
+            PT_TEST_VALUES,
+            "We = 1 / (A_film A_lens cos^4), cosine at the point, over the densities of point and lens");
         if (k == 0)
             pt_check_mean("density of camera rays", &whole, 1, 1e-6, 0.02, PT_TEST_VALUES,
                           "pt_camera_pdf must integrate to 1");

@@ -188,7 +188,8 @@ static void furnaces(void)
                 e.options.roulette_survival = (pt_real)(0.5 + 0.5 * rho[i]);
                 e.options.roulette_start = start[i];
                 (m == PLAIN ? by_values : by_means)(&e, 100 + (uint64_t)(60 * shape + 10 * i + m),
-                                                    paths[i][m] + (m == LIGHT && shape ? paths[i][m] / 5 : 0), s);
+                                                    paths[i][m] + (m == LIGHT && shape ? paths[i][m] / 5 : 0),
+                                                    s);
                 pt_check_mean(
                     label("furnace %s, rho %g, %s", shape ? "sphere" : "box", rho[i], METHODS[m].name), &s[0],
                     1 / (1 - rho[i]), 0, m == LIGHT ? 0.01 : 0.005,
@@ -275,7 +276,9 @@ static void roulette_path_length(void)
              strange, n);
     pt_check_mean("roulette: edges of a path", &edges, 2, 0, 0.005, PT_TEST_VALUES,
                   "the first roulette is drawn after edge 1, survival P_RR");
-    pt_check_mean("roulette: variance of a path", &square, 2, 0, 0.05, PT_TEST_VALUES, "");
+    pt_check_mean(
+        "roulette: variance of a path", &square, 2, 0, 0.05, PT_TEST_VALUES,
+        "the number of edges is geometric: variance q / (1 - q)^2; is each edge's roulette drawn afresh?");
     pt_scene_free(&scene);
 }
 
@@ -630,8 +633,9 @@ static void pool_closed_form(void)
     for (i = 0; i < 4; i++) {
         pt_ray ray = pool_ray(angle[i]);
         ray.d = v3(sin(angle[i] * PT_PI / 180), -cos(angle[i] * PT_PI / 180), 0);
-        pt_check_near("pool, closed form", pool_radiance(&ray, 0.5, 0, 1, i < 3 ? 1.33 : 1.5), exact[i], 2e-7,
-                      "");
+        pt_check_near(
+            "pool, closed form", pool_radiance(&ray, 0.5, 0, 1, i < 3 ? 1.33 : 1.5), exact[i], 2e-7,
+            "Fresnel's mean over the hemisphere weighs with 2 cos; from inside it is 1 - (1 - F) / n^2");
     }
 }
 
@@ -1251,7 +1255,8 @@ static void check_bounces(const cornell_reference *reference, const pt_stats s[6
                   "long paths: roulette");
     pt_check_mean("Cornell, mean without the lamp, green", &s[0],
                   reference->image.rgb[1] - reference->bounce[0][1],
-                  reference_error(sqrt(pt_stats_variance(&s[0]) / 4e7)), 0.02, PT_TEST_VALUES, "");
+                  reference_error(sqrt(pt_stats_variance(&s[0]) / 4e7)), 0.02, PT_TEST_VALUES,
+                  "all bounces together: does green alone fail? then a reflectance, else the transport");
 }
 
 static void cornell_bounces(void)
