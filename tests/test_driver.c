@@ -739,6 +739,7 @@ static void check_estimate(const char *name, const stage *s, pt_render_desc d, u
    side. */
 static void estimated_error(void)
 {
+    pt_test_source("estimated over true squared error: ratio 1; truth 1 + 1/2 + 1/4, geometric series");
     static const pt_sampler_kind kind[2] = {PT_SAMPLER_INDEPENDENT, PT_SAMPLER_SOBOL};
     const uint32_t spp = pt_test_long() ? 64 : 8;
     stage s = stage_of("furnace");
@@ -764,6 +765,8 @@ static void estimated_error(void)
    spread too much for any number of seeds. */
 static void estimated_error_cornell(void)
 {
+    pt_test_source(
+        "estimated over true squared error: ratio 1; truth: a render with another seed, less its own error");
     static const pt_sampler_kind kind[2] = {PT_SAMPLER_INDEPENDENT, PT_SAMPLER_SOBOL};
     static const uint32_t spp[3] = {8, 64, 256};
     enum { SIDE = 24 };

@@ -358,6 +358,7 @@ static void plain_table(const char *table, pt_integrand f, const char *first, co
 
 static void one_dimension(void)
 {
+    pt_test_source("tests/data/oracles_mc.csv: MC-POW, -EXP, -GAUSS, -LORENTZ, -STEP, elementary integrals");
     plain_table("MC-POW", power_of, "p", NULL, 10000);
     plain_table("MC-EXP", exponential, "a", NULL, 15000);
     plain_table("MC-GAUSS", gaussian, "c", "s", 20000);
@@ -389,6 +390,7 @@ static void nd_rows(const char *what, pt_integrand f, uint64_t seed)
 
 static void many_dimensions(void)
 {
+    pt_test_source("tests/data/oracles_mc.csv: MC-ND, elementary integrals");
     job j = {.name = "sum of 10", .how = MEAN, .f = sum_of, .a = {10}, .dimensions = 10, .exact = 5};
     nd_rows("prod", product, 40000);
     nd_rows("ball", ball, 46000);
@@ -398,6 +400,7 @@ static void many_dimensions(void)
 /* Families of Genz by every kind of numbers */
 static void genz(void)
 {
+    pt_test_source("tests/data/oracles_mc.csv: MC-GENZ, families of A. Genz, 1984");
     static const struct {
         const char *quantity;
         pt_integrand f;
@@ -509,6 +512,7 @@ static void second_moments(void)
 /* Peaks that plain Monte Carlo misses: importance sampling by a wider peak, and of f^2 by f */
 static void peaks(void)
 {
+    pt_test_source("tests/data/oracles_mc.csv: MC-LORENTZ, MC-ND, elementary integrals");
     double a[2], wide[2];
     const pt_technique same = {tangent_warp, tangent_density, a},
                        wider = {tangent_warp, tangent_density, wide};
@@ -577,6 +581,7 @@ static void show_order(const job *j, const char *name, double theory, uint64_t s
 
 static void heavy_tails(void)
 {
+    pt_test_source("tests/data/oracles_mc.csv: MC-HEAVY, elementary integrals");
     job j = {.how = MEAN, .f = power_of, .dimensions = 1, .law = {{0, 1}, {0, 1}}};
     tally t;
     const row *r;
@@ -750,6 +755,7 @@ static double calls_each(const job *j)
 
 static void unbiased(void)
 {
+    pt_test_source("elementary integrals; the mean of reported squared errors is that of true ones");
     static const pt_sampler_kind kinds[3] = {PT_SAMPLER_SOBOL, PT_SAMPLER_INDEPENDENT, PT_SAMPLER_STRATIFIED};
     static const char *const names[3] = {"sobol", "independent", "stratified"};
     const uint32_t n = pt_test_samples(256);
@@ -858,6 +864,8 @@ static void mis_rows(const char *quantity, pt_heuristic heuristic, int one, uint
 
 static void mis_variances(void)
 {
+    pt_test_source(
+        "tests/data/oracles_mc.csv: MC-MIS (Veach and Guibas 1995); others by Gauss quadrature in the test");
     static const mis_case others[8] = {
         {2, {1, 1}, PT_HEURISTIC_MAXIMUM, 0},     {1, {2, 1}, PT_HEURISTIC_BALANCE, 0},
         {2, {1, 3}, PT_HEURISTIC_POWER, 0},       {2, {4, 4}, PT_HEURISTIC_BALANCE, 0},
@@ -873,6 +881,7 @@ static void mis_variances(void)
 
 static void importance_variances(void)
 {
+    pt_test_source("tests/data/oracles_mc.csv: MC-IS, elementary: 1/((q+1)(2p-q+1)) - I^2");
     const row *r;
     char name[96];
     int at = 0;
@@ -894,6 +903,7 @@ static void importance_variances(void)
    1/48, E Var(f|x) is 1/36. */
 static void other_variances(void)
 {
+    pt_test_source("elementary: worked out at the test");
     static const double c[3] = {0, 1, 1.6903090292428586}, q[3] = {1, 0.5, 0.1};
     const double covariance = 0.5 * (3 - 2.7182818284590452),
                  variance = find_row("MC-EXP", "Var", "a=1")->value;
@@ -999,6 +1009,8 @@ static const job on_saddle = {.name = "saddle", .how = MEAN, .f = centred_produc
 
 static void stratified_variances(void)
 {
+    pt_test_source("tests/data/oracles_mc.csv: MC-STRAT (Haber 1966, Mitchell 1996), MC-STRATSTEP, one "
+                   "Bernoulli cell a row");
     static const struct {
         const char *table, *quantity;
         spread of;
@@ -1019,6 +1031,7 @@ static void stratified_variances(void)
 
 static void scrambled_variances(void)
 {
+    pt_test_source("tests/data/oracles_mc.csv: MC-OWEN (gain coefficients, Owen 1997)");
     static const char *const quantities[3] = {"Var_x", "Var_xplusy", "Var_centredproduct"};
     static const job *const on[3] = {&on_line, &on_plane, &on_saddle};
     const row *r;
@@ -1195,6 +1208,8 @@ static void one_order(const order_case *o, int too_slow, uint64_t seed)
    its order, a curved edge cuts cells irregularly. The exact variances say what the slope must be. */
 static void orders(void)
 {
+    pt_test_source("n^-1/2, or the slope between exact variances: means over boxes, gains of a scrambled net "
+                   "(Owen 1997)");
     static const job bend = {.name = "e^x", .how = MEAN, .f = exponential, .a = {1}, .dimensions = 1};
     static const job disk = {.name = "disk", .how = MEAN, .f = ball, .a = {2}, .dimensions = 2};
     static const job peak = {
@@ -1421,6 +1436,7 @@ static void expect_wrong(const char *name, const pt_estimate *e)
 
 static void wrong_estimators(void)
 {
+    pt_test_source("elementary integrals; WRONG ones must be rejected");
     static const double weights[5][2] = {{1, 1}, {0, 0}, {1, 0}, {0, 1}, {2, 2}};
     static const char *const names[5] = {"balance weights", "power weights", "WRONG: balance beside power",
                                          "WRONG: power beside balance", "WRONG: two techniques in full"};
@@ -1611,6 +1627,7 @@ static double p_values[P_VALUES];
 
 static void p_of_means(void)
 {
+    pt_test_source("p-values under the null hypothesis are uniform");
     pt_pcg32 rng = pt_pcg32_make(pt_test_seed(410000), 1);
     const uint32_t n = pt_test_all_samples(P_VALUES);
     uint32_t i;
@@ -1643,6 +1660,7 @@ static void throw_counts(pt_pcg32 *rng, uint32_t tilt, double *observed)
 
 static void p_of_counts(void)
 {
+    pt_test_source("p-values under the null hypothesis are uniform");
     static const double expected[9] = {4, 4, 4, 52, 256, 1024, 2048, 4796, 4};
     pt_pcg32 rng = pt_pcg32_make(pt_test_seed(420000), 1);
     const uint32_t n = pt_test_all_samples(4096);
@@ -1680,6 +1698,7 @@ static void kolmogorov(void)
 
 static void coverage(void)
 {
+    pt_test_source("definition of a confidence interval");
     static const double confidence[2] = {0.5, 0.8};
     pt_pcg32 rng = pt_pcg32_make(pt_test_seed(440000), 1);
     const uint32_t n = pt_test_all_samples(1u << 14);
@@ -1704,6 +1723,7 @@ static double scatter(double n, double kurtosis) { return sqrt((kurtosis - (n - 
 /* The kurtosis of uniform numbers is 1.8. */
 static void variance_of_variance(void)
 {
+    pt_test_source("relative variance of s^2: (kurtosis - (n-3)/(n-1)) / n, kurtosis of uniform numbers 1.8");
     const uint32_t runs = pt_test_all_samples(1u << 15), n = 512;
     const double exact = scatter(n, 1.8);
     const row *r;

@@ -334,6 +334,7 @@ static void expect_uniform(const char *name, const double *counts, int cells, co
 /* Over the seeds every scrambled value is uniform. */
 static void owen_uniform(void)
 {
+    pt_test_source("a scrambled number is uniform over seeds (Owen 1995)");
     static const uint32_t values[3] = {0, 0x80000000u, 0xcafebabeu};
     const uint32_t n = pt_test_samples(1u << 18);
     int i;
@@ -350,6 +351,7 @@ static void owen_uniform(void)
 /* Flip any input bit of the hash: every byte of the change is uniform. */
 static void avalanche(void)
 {
+    pt_test_source("flipped bits of a good hash are fair coins");
     static double counts[8][256];
     pt_pcg32 rng = pt_pcg32_make(pt_test_seed(1), 1);
     const uint32_t n = pt_test_samples(1u << 17);
@@ -368,6 +370,7 @@ static void avalanche(void)
 
 static void pcg32_uniform(void)
 {
+    pt_test_source("uniform distribution");
     double counts[1024] = {0};
     pt_pcg32 rng = pt_pcg32_make(pt_test_seed(2), 2);
     const uint32_t n = pt_test_samples(1u << 19);
@@ -502,6 +505,7 @@ static void strata(void)
 /* Each number alone is uniform when the seed varies: no sampler is biased. */
 static void uniform_over_seeds(void)
 {
+    pt_test_source("uniform distribution: randomised points are each uniform");
     static const char *const names[3] = {"sobol over seeds", "independent over seeds",
                                          "stratified over seeds"};
     const uint32_t n = pt_test_samples(1u << 17);
@@ -547,6 +551,7 @@ static void neighbours(const char *name, pt_sampler_kind kind, unsigned next_str
 
 static void independence(void)
 {
+    pt_test_source("uniform distribution on the square: pairs that must be independent");
     neighbours("independent, neighbouring pixels", PT_SAMPLER_INDEPENDENT, 1, 0, 3, 11);
     neighbours("independent, neighbouring samples", PT_SAMPLER_INDEPENDENT, 0, 1, 3, 12);
     neighbours("independent, neighbouring dimensions", PT_SAMPLER_INDEPENDENT, 0, 0, 4, 13);
@@ -752,6 +757,7 @@ static void one_integral(const integral *f, int kind, uint64_t seed)
 
 static void estimates(void)
 {
+    pt_test_source("elementary integrals; the mean of reported squared errors is that of true ones");
     int i, k;
     for (i = 0; i < 6; i++)
         for (k = 0; k < 3; k++) one_integral(&integrals[i], k, (uint64_t)(1000 + 100 * (3 * i + k)));
@@ -909,6 +915,7 @@ static void one_estimator(estimator k, pt_sampler_kind kind, uint64_t seed)
 
 static void other_estimators(void)
 {
+    pt_test_source("elementary integrals");
     int k, s;
     for (k = 0; k < ESTIMATORS; k++)
         for (s = 0; s < 3; s++) one_estimator((estimator)k, kinds[s], (uint64_t)(4000 + 100 * (3 * k + s)));
@@ -943,6 +950,7 @@ static void other_estimators_refuse(void)
 /* Jittered sampling has exact variances: 1/(12 N^3) for x in N strata, 1/(6 N^2) for x + y in N cells. */
 static void jittered_variance(void)
 {
+    pt_test_source("1/(12 N^3) for x in N strata, 1/(6 N^2) for x + y in N cells");
     static const uint32_t counts[3] = {4, 16, 64};
     const uint32_t sets = pt_test_all_samples(1u << 15);
     int c;
@@ -998,6 +1006,7 @@ static void mis_weights(void)
 
 static void mis_of_powers(void)
 {
+    pt_test_source("Veach and Guibas 1995: integral of sum of (w f)^2 / p, by quadrature");
     static const double row[3][3] = {/* p, variance with balance, with power heuristic */
                                      {1, 0.011110988148968387, 0.013250220050248314},
                                      {2, 0.018721058606716604, 0.018175986775525456},
@@ -1625,6 +1634,7 @@ static void bad_paths(void)
 
 static void harness(void)
 {
+    pt_test_source("mean 1/2 of uniform numbers; a fair coin");
     pt_stats s = PT_STATS_INIT, other = PT_STATS_INIT;
     pt_pcg32 rng = pt_pcg32_make(pt_test_seed(90), 9);
     const uint32_t n = pt_test_samples(1u << 16);

@@ -296,6 +296,7 @@ static void check_lamp(const row *r, pt_scene *scene)
 
 static void solid_angles_of_spheres(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: RAD-CAP, RAD-SPH, elementary");
     const row *r;
     int at;
     for (at = 0; (r = next_row("RAD-CAP", NULL, &at)) != NULL;) {
@@ -321,6 +322,7 @@ static double in_cap(const void *user, pt_sampler *s)
 
 static void directions_in_caps(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: RAD-CAP, elementary: 2 pi (1 - cos a)");
     const row *r;
     int at = 0;
     while ((r = next_row("RAD-CAP", NULL, &at)) != NULL) {
@@ -342,6 +344,8 @@ static void add_facing(pt_scene *scene, pt_vec3 a, pt_vec3 b, pt_vec3 c, int mat
 
 static void solid_angles_of_flat_shapes(void)
 {
+    pt_test_source(
+        "tests/data/oracles_radiometry.csv: RAD-TRI (Van Oosterom and Strackee 1983), RAD-RECT, elementary");
     const pt_vec3 o = v3(0, 0, 0);
     const row *r;
     int at;
@@ -418,6 +422,7 @@ static void add_disk(pt_scene *scene, double r, double y, int up, int material)
 
 static void disks(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: RAD-DISK (Paxton 1959), RAD-EDISK (Howell 2010)");
     const row *r;
     int at;
     for (at = 0; (r = next_row("RAD-DISK", NULL, &at)) != NULL;) {
@@ -500,6 +505,7 @@ static double flux_through_sphere(const void *user, pt_sampler *s)
 
 static void spots(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: RAD-SPOT, smoothstep between the cosines");
     static const double falloff[7] = {0, 0, 5.0 / 32, 0.5, 27.0 / 32, 1, 1};
     const row *r;
     int at = 0, k;
@@ -528,6 +534,7 @@ static void spots(void)
 
 static void sphere_lights(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: RAD-ESPH (Snyder 1996)");
     const row *r;
     int at = 0;
     while ((r = next_row("RAD-ESPH", NULL, &at)) != NULL) {
@@ -574,6 +581,7 @@ static void check_polygon(const row *r, const double (*v)[3], int count, int as_
 
 static void polygon_lights(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: RAD-EPOLY (Lambert 1760)");
     const row *r;
     int at = 0;
     while ((r = next_row("RAD-EPOLY", NULL, &at)) != NULL) {
@@ -592,6 +600,7 @@ static void polygon_lights(void)
 
 static void regular_polygons(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: RAD-NGON (Lambert 1760)");
     const row *r;
     int at = 0;
     while ((r = next_row("RAD-NGON", NULL, &at)) != NULL) {
@@ -644,6 +653,7 @@ static double sky_deviation(const void *user, pt_sampler *s)
 
 static void skies(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: RAD-SKY, elementary");
     const row *r;
     int at = 0;
     double mean = 0; /* its row stands before those of the variances */
@@ -679,6 +689,7 @@ static void skies(void)
    instead, which adds up to pi. The floor ends a millionth below the true horizon. */
 static void tilted_planes(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: RAD-TILT, elementary: pi (1 + cos t)/2");
     const double size = 1e6;
     const row *r;
     int at = 0;
@@ -727,6 +738,7 @@ static void bulb(const row *r, double intensity)
 
 static void photometry(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: RAD-PHOT, definition of the candela in the SI");
     /* 540 THz is 555.017 nm, where V is below its greatest value by less than 1e-5 */
     const double nm = 299792458e9 / 540e12;
     double bar[3], intensity = 0; /* its row stands before that of the bulb */
@@ -800,6 +812,7 @@ static double one_wavelength(const void *user, pt_sampler *s)
 
 static void black_bodies(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: RAD-BB, Planck's law, CODATA 2019");
     double exitance = 0;
     const row *r;
     int at = 0;
@@ -926,6 +939,7 @@ static patch on_floor(double x0, double x1, double z0, double z1)
 
 static void rectangles(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: VF-PAR, VF-PERP (Howell 2010)");
     const row *r;
     int at;
     near_relative("squares far apart", 1e12 * PT_PI * pt_form_factor_parallel(1, 1, 1e6), 1, 1e-11);
@@ -958,6 +972,7 @@ static double parallel_in_general(const double a[4], const double b[4], double c
 
 static void rectangles_in_general_position(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: VF-PAROFF (Howell 2010)");
     const row *r;
     int at = 0;
     while ((r = next_row("VF-PAROFF", "F12", &at)) != NULL) {
@@ -973,6 +988,7 @@ static void rectangles_in_general_position(void)
 
 static void strips(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: VF-STRIP, VF-WEDGE (Hottel's crossed strings)");
     const row *r;
     int at;
     for (at = 0; (r = next_row("VF-STRIP", "F12", &at)) != NULL;) {
@@ -1023,6 +1039,7 @@ static double mean_irradiance(const void *user, pt_sampler *s)
 
 static void coaxial_disks(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: VF-DISK (Howell 2010)");
     const row *r;
     int at = 0;
     while ((r = next_row("VF-DISK", "F12", &at)) != NULL) {
@@ -1063,6 +1080,7 @@ static double flux_onto_disk(const void *user, pt_sampler *s)
 
 static void sphere_and_disk(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: VF-SPHDISK (Howell 2010)");
     const row *r;
     int at = 0;
     while ((r = next_row("VF-SPHDISK", "F_sd", &at)) != NULL) {
@@ -1117,6 +1135,7 @@ static double onto_inner_cylinder(const void *user, pt_sampler *s)
 
 static void concentric(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: VF-CONC, reciprocity");
     const row *r;
     int at = 0;
     while ((r = next_row("VF-CONC", NULL, &at)) != NULL) {
@@ -1181,6 +1200,7 @@ static double side_to_side(const void *user, pt_sampler *s)
 
 static void closed_cylinders(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: VF-CYL (Howell 2010)");
     const row *r;
     int at = 0;
     while ((r = next_row("VF-CYL", NULL, &at)) != NULL) {
@@ -1233,6 +1253,8 @@ static double bowl_to_itself(const void *user, pt_sampler *s)
 
 static void bowls(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: VF-SPHCAV, the kernel of a sphere is constant "
+                   "(Jacquez and Kuppenheim 1955)");
     const row *r;
     int at = 0;
     while ((r = next_row("VF-SPHCAV", "F_self", &at)) != NULL) {
@@ -1306,6 +1328,7 @@ static int face_of(const char *quantity)
 
 static void cube_by_reflections(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: VF-CUBE1, quadrature of products of form factors");
     const double fo = pt_form_factor_parallel(1, 1, 1), fa = pt_form_factor_perpendicular(1, 1, 1);
     const row *r;
     int at = 0;
@@ -1389,6 +1412,7 @@ static double wall_radiance(const void *user, pt_sampler *s)
 
 static void integrating_spheres(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: VF-ISPH (Jacquez and Kuppenheim 1955)");
     const row *r;
     int at = 0;
     while ((r = next_row("VF-ISPH", NULL, &at)) != NULL) {
@@ -1427,6 +1451,7 @@ static double lit_wall(const void *user, pt_sampler *s)
 
 static void spheres_around_point_lights(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: VF-ISPHPT (Jacquez and Kuppenheim 1955)");
     const row *r;
     int at = 0;
     while ((r = next_row("VF-ISPHPT", "L", &at)) != NULL) {
@@ -1462,6 +1487,7 @@ static double between_spheres(const void *user, pt_sampler *s)
 
 static void concentric_spheres_that_shine(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: VF-CSPH, reciprocity and symmetry");
     static const char *const keys[2][3] = {{"r1", "rho1", "Le1"}, {"r2", "rho2", "Le2"}};
     const row *r;
     int at = 0, k;

@@ -129,6 +129,7 @@ static int warp_cell(warp k, pt_vec3 w)
 
 static void warps(void)
 {
+    pt_test_source("closed form: areas of the cells under the density of the warp");
     const uint32_t n = pt_test_samples(1u << 17);
     int k;
     for (k = 0; k < WARPS; k++) {
@@ -162,6 +163,7 @@ static double one_minus_cos(pt_vec3 w)
 
 static void cones(void)
 {
+    pt_test_source("closed form: 1 - cos is uniform, and so is the azimuth");
     static const double omc[8] = {1e-20, 1e-12, 1e-6, 0.01, 0.5, 1, 1.7, 2};
     const uint32_t n = pt_test_all_samples(1u << 16);
     int c, i;
@@ -208,6 +210,7 @@ static void corners_of_the_square(void)
 /* Densities integrate to 1, and 1/density over samples to the solid angle of the support. */
 static void densities(void)
 {
+    pt_test_source("densities integrate to 1; irradiance pi under a uniform sky");
     const uint32_t n = pt_test_samples(1u << 17);
     pt_stats hemisphere = PT_STATS_INIT, cosine = PT_STATS_INIT, hit_and_miss = PT_STATS_INIT;
     pt_pcg32 rng = generator(30);
@@ -275,6 +278,7 @@ static const seen_triangle seen[7] = {
 
 static void spherical_triangles(void)
 {
+    pt_test_source("solid angles of sub-triangles (Van Oosterom and Strackee 1983)");
     const uint32_t n = pt_test_samples(1u << 16);
     int t, i, j, k;
     for (t = 0; t < 7; t++) {
@@ -319,6 +323,7 @@ static double rectangle(double x0, double x1, double y0, double y1, double h)
 
 static void spherical_rectangles(void)
 {
+    pt_test_source("solid angles of parts of a rectangle (Urena et al. 2013)");
     static const double r[7][5] = {
         /* x0, x1, y0, y1, h */
         {-0.5, 0.5, -0.5, 0.5, 0.5},   {-16, 16, -8, 8, 0.25}, {1, 3, 2, 2.5, 0.125},
@@ -384,6 +389,7 @@ static void one_alias(const char *name, const double *weights, uint32_t count, u
 
 static void alias_tables(void)
 {
+    pt_test_source("expected counts n w / sum of w");
     static const double one[1] = {3}, two[2] = {1, 3}, holes[6] = {0, 1, 0, 4, 2, 0},
                         wide[3] = {1e30, 1e-30, 1e30}, bad[2] = {1, -1}, nothing[3] = {0, 0, 0};
     double many[64], infinite[2] = {1, HUGE_VAL};
@@ -466,6 +472,7 @@ static void one_story(const char *name, const pt_bsdf *b, pt_vec3 wo, pt_transpo
 
 static void diffuse(void)
 {
+    pt_test_source("the mean weight of samples is the integral of f cos: the albedo");
     const pt_material m = pt_material_diffuse(pt_rgb3(real(0.8), real(0.5), real(0.1)));
     const pt_vec3 n = pt_v3_normalize(pt_v3(1, -2, 2)), tilted = pt_v3_normalize(pt_v3(1, -2, 3));
     const pt_hit flat = hit_of(n, n), smooth = hit_of(n, tilted);
@@ -493,6 +500,7 @@ static void diffuse(void)
 /* Sampled directions against pdf cos/pi, with a normal that is no axis. */
 static void diffuse_directions(void)
 {
+    pt_test_source("closed form: cos / pi");
     const uint32_t n = pt_test_samples(1u << 17);
     const pt_material m = pt_material_diffuse(pt_rgb_grey(1));
     const pt_vec3 normal = pt_v3_normalize(pt_v3(-3, 1, real(0.5)));
@@ -581,6 +589,7 @@ static double fresnel_integrand(const double *u, void *eta)
 /* Values for 1.5 by quadrature; from inside by 1 - F = (1 - F outside) / n^2. */
 static void fresnel_of_diffuse_light(void)
 {
+    pt_test_source("Fresnel's equations, by quadrature; inside: 1 - (1 - F)/n^2");
     static const double exact[2] = {0.091777959, 0.596345760};
     int inside, i;
     for (inside = 0; inside < 2; inside++) {
@@ -787,7 +796,7 @@ static double closed_form(const light_case *l)
 static void one_light(const light_case *l, uint64_t seed)
 {
     const double exact = closed_form(l);
-    const uint32_t n = pt_test_samples(exact > 1e-6 && exact < 0.03 ? 1u << 19 : 1u << 16);
+    const uint32_t n = pt_test_samples(exact > 1e-6 && exact < 0.03 ? 1u << 19 : 1u << 17);
     const pt_vec3 o = pt_v3(0, 0, 0);
     pt_pcg32 rng = generator(seed);
     pt_scene scene = PT_SCENE_INIT;
@@ -829,6 +838,7 @@ static void one_light(const light_case *l, uint64_t seed)
 
 static void irradiance(void)
 {
+    pt_test_source("Lambert 1760 for polygons, Snyder 1996 for spheres");
     int i;
     for (i = 0; i < LIGHTS; i++) one_light(&lights[i], (uint64_t)(300 + i));
 }
@@ -836,6 +846,7 @@ static void irradiance(void)
 /* Random directions find the light with the density that pt_light_pdf_w says: it integrates to 1. */
 static void light_densities(void)
 {
+    pt_test_source("densities integrate to 1");
     const uint32_t n = pt_test_all_samples(1u << 18);
     int k;
     for (k = 0; k < LIGHTS; k++) {
@@ -932,6 +943,7 @@ static void sphere_lights(void)
 #if PTI_HAS_ENVIRONMENT
 static void point_and_environment(void)
 {
+    pt_test_source("closed form: pi L under a sky; inverse square law");
     pt_scene scene = PT_SCENE_INIT;
     const pt_vec3 p = pt_v3(1, 2, 3);
     pt_light_sample_result s;
@@ -974,6 +986,7 @@ static void point_and_environment(void)
 /* Chosen by their share of the power: pi A L, 4 pi I. */
 static void choice_by_power(void)
 {
+    pt_test_source("shares of the power: pi A L, 4 pi I");
     pt_scene scene = PT_SCENE_INIT;
     const int dim = pt_add_material(&scene, pt_material_emitter(pt_rgb3(1, 2, 3))),
               bright = pt_add_material(&scene, pt_material_emitter(pt_rgb_grey(8)));
@@ -1019,6 +1032,7 @@ static void choice_by_power(void)
 /* Each emitted ray carries L cos / (pdf_a pdf_w): the mean is the power, pi A L for each side. */
 static void emitted_power(void)
 {
+    pt_test_source("closed form: pi A L for each side; cosine about the normal");
     const uint32_t n = pt_test_all_samples(1u << 14);
     int k;
     for (k = 0; k < LIGHTS; k++) {
@@ -1057,6 +1071,7 @@ static void emitted_power(void)
 /* Uniform points: a triangle in 16 equal parts, a parallelogram in 64, a sphere in 64. */
 static void emitted_points(void)
 {
+    pt_test_source("uniform by area");
     static const int which[3] = {0, 14, 16};
     const uint32_t n = pt_test_samples(1u << 15);
     int k;
@@ -1102,6 +1117,7 @@ static void emitted_points(void)
 /* The share of a square's light that falls on another: form factors of unit squares (Howell's catalogue). */
 static void form_factors(void)
 {
+    pt_test_source("unit squares: opposite and perpendicular (Howell 2010)");
     static const double exact[2] = {0.19982489569838738, 0.20004377607540315};
     const uint32_t n = pt_test_samples(1u << 18);
     int k;
@@ -1139,6 +1155,7 @@ static void form_factors(void)
 /* A point light sends 4 pi I in all directions; a sky L sends 4 pi r^2 pi L onto a ball of radius r. */
 static void emission_of_the_rest(void)
 {
+    pt_test_source("closed form: 4 pi I; 4 pi r^2 pi L onto a ball");
     const uint32_t n = pt_test_samples(1u << 17);
     pt_scene scene = PT_SCENE_INIT;
     pt_pcg32 rng = generator(620);
@@ -1282,6 +1299,7 @@ static void camera_round_trip(void)
    And the density of camera rays integrates to 1 over directions. */
 static void measurement(void)
 {
+    pt_test_source("the importance of a camera integrates to 1 (Veach 1997)");
     static const double lens[2] = {0, 0.3};
     const uint32_t n = pt_test_samples(1u << 18);
     const double omc = 0.25, radius = 7; /* a cone that holds the picture */
@@ -1318,6 +1336,7 @@ static void measurement(void)
 /* All rays of a picture point meet in the plane in focus; elsewhere they fill the circle of confusion. */
 static void thin_lens(void)
 {
+    pt_test_source("second moment of a uniform disk: r^2/4; similar triangles");
     const pt_camera c = test_camera(0.3);
     const uint32_t n = pt_test_samples(1u << 14);
     const double z[2] = {2, 10};

@@ -4,7 +4,7 @@
 
    Run it in the project's top directory: it reads tests/data. LONG=1 repeats the agreements of methods with
    more samples. Exact values are closed forms worked out at the line, or come from the files in tests/data.
-   The work is 60 to 80 CPU seconds; arguments choose functions: ./test_transport furnaces pools. */
+   The work is about 50 CPU seconds; arguments choose functions: ./test_transport furnaces pools. */
 
 #define PATHTRACER_IMPLEMENTATION
 #include "pt_test.h"
@@ -171,6 +171,7 @@ static const pt_ray *furnace_ray(void)
    and half of that in vain; its bound is 1 %. */
 static void furnaces(void)
 {
+    pt_test_source("geometric series: 1/(1 - rho)");
     static const double rho[3] = {0.5, 0.8, 0.95};
     static const int start[3] = {6, 16, 64};
     /* in a randomisation, but values without light sampling, which are too skewed for few of them */
@@ -205,6 +206,7 @@ static void furnaces(void)
    rho)^2, so the bound is wider there. */
 static void furnace_default_roulette(void)
 {
+    pt_test_source("geometric series: 1/(1 - rho)");
     static const double rho[2] = {0.8, 0.95}, bound[2] = {0.005, 0.02};
     static const uint32_t paths[2] = {8192, 640};
     int i;
@@ -224,6 +226,7 @@ static void furnace_default_roulette(void)
    variance need q > rho^2, a finite skewness q^2 > rho^3. */
 static void furnace_constant_roulette(void)
 {
+    pt_test_source("geometric series: 1/(1 - rho)");
     static const double rho[5] = {0.5, 0.5, 0.5, 0.8, 0.95}, q[5] = {0.45, 0.8, 0.95, 0.9, 0.97};
     static const double bound[5] = {0.005, 0.005, 0.005, 0.005, 0.02};
     static const uint32_t paths[5] = {1800000, 256, 128, 1280, 256}; /* the first in all */
@@ -255,6 +258,7 @@ static void furnace_constant_roulette(void)
    and variance q / (1 - q)^2 = 2. */
 static void roulette_path_length(void)
 {
+    pt_test_source("geometric law: mean 1/(1 - q), variance q/(1 - q)^2");
     pt_scene scene = furnace_sphere(v3(0, 0, 0), 1, 0.5);
     experiment e = experiment_of(&scene, *furnace_ray(), PLAIN);
     pt_sampler sampler = pt_sampler_make(PT_SAMPLER_INDEPENDENT, pt_test_seed(170), 0);
@@ -285,6 +289,7 @@ static void roulette_path_length(void)
 /* max_edges k: 1 + rho + ... + rho^(k-1). Without light sampling each path has exactly that radiance. */
 static void furnace_truncated(void)
 {
+    pt_test_source("geometric series: (1 - rho^k)/(1 - rho)");
     static const int edges[4] = {1, 2, 3, 5};
     const double rho = 0.8;
     pt_scene scene = furnace_box(rho);
@@ -339,6 +344,7 @@ static void scale_of_furnace(double radius, double away, uint64_t seed)
 
 static void furnace_scales(void)
 {
+    pt_test_source("geometric series: 2 - 2^-19");
     static const double radius[3] = {1e-4, 1, 1e6}, away[3] = {0, 1e2, 1e4};
     int i, j;
     for (i = 0; i < 3; i++)
@@ -485,6 +491,7 @@ static void radiance_inside_glass(void)
 /* A white diffuse ball is invisible too, but only in the mean. */
 static void white_ball(void)
 {
+    pt_test_source("without losses, radiance is that of the surroundings: 1");
     int room, m;
     for (room = 0; room < 2; room++)
         for (m = 0; m < 3; m++) {
@@ -585,6 +592,7 @@ static void check_pool(const char *name, const pt_scene *scene, const double wat
 /* Without roulette, which would be most of the variance here; then with it. */
 static void pools(void)
 {
+    pt_test_source("closed form from Fresnel's equations: see pool_radiance in the test");
     static const double angle[3] = {0, 45, 75};
     static const double water[4][4] = {
         {0.5, 0, 1, 1.33}, {0.8, 0, 1, 1.5}, {0, 1, 0, 1.33}, {0.5, 1, 0, 1.5}};
@@ -608,6 +616,7 @@ static void pools(void)
 /* The direction of a ray need not have unit length, a camera's neither. */
 static void length_of_rays(void)
 {
+    pt_test_source("closed form from Fresnel's equations: see pool_radiance in the test");
     static const double length[2] = {7, 1e-3};
     pt_scene scene = pool(0, 1, 0, 1.33);
     int i;
@@ -664,6 +673,7 @@ static void white_pool(void)
    reflections inside, with F that of one side, unpolarised at each. */
 static void glass_plate(void)
 {
+    pt_test_source("closed form: 2F/(1 + F), F of one side by Fresnel's equations");
     pt_scene s = PT_SCENE_INIT;
     experiment e = experiment_of(&s, pool_ray(60), PATH);
     const double f = fresnel(-(double)e.ray.d.y, 1.5);
@@ -782,6 +792,7 @@ static double sphere_irradiance(double d, double beta)
 
 static void direct_sphere(void)
 {
+    pt_test_source("rho/pi E, irradiance of a sphere (Snyder 1996)");
     static const double beta[5] = {0, 45, 75, 90, 105};
     int i;
     for (i = 0; i < 5; i++) {
@@ -798,6 +809,7 @@ static void direct_sphere(void)
    it. */
 static void direct_small_sphere(void)
 {
+    pt_test_source("rho L (r/d)^2");
     pt_scene s = PT_SCENE_INIT;
     const double exact = 0.5 * 1e12 * 1e-10 / 9; /* rho/pi * pi L (r/d)^2 */
     int m;
@@ -818,6 +830,7 @@ static void direct_small_sphere(void)
 
 static void direct_rectangle(void)
 {
+    pt_test_source("rho/pi E, Lambert 1760");
     /* corner, edges (which look at the floor or at the origin), irradiance; closed forms by Lambert's
        formula */
     static const struct {
@@ -844,6 +857,7 @@ static void direct_rectangle(void)
    sampling. */
 static void direct_parallelogram(void)
 {
+    pt_test_source("rho/pi E, Lambert 1760");
     const pt_vec3 v[4] = {v3(-0.9, 1.1, -0.4), v3(0.4, 1.4, -0.8), v3(1.5, 1.2, 0.7), v3(0.2, 0.9, 1.1)};
     int kind;
     for (kind = 0; kind < 2; kind++) {
@@ -861,6 +875,7 @@ static void direct_parallelogram(void)
 /* The triangles of tests/data/triangle_lights.csv: nine coordinates, then the irradiance. */
 static void direct_triangle(void)
 {
+    pt_test_source("rho/pi E, tests/data/triangle_lights.csv and Lambert 1760");
     FILE *const file = fopen("tests/data/triangle_lights.csv", "r");
     char line[512];
     uint64_t row = 0;
@@ -905,6 +920,7 @@ static double disk_integrand(const double *u, void *user)
 
 static void direct_disk(void)
 {
+    pt_test_source("irradiance of a parallel disk (Howell 2010)");
     static const disk_light light[4] = {{1, 1, 0}, {1, 1, 0.5}, {1, 2, 3}, {0.25, 1, 1}};
     int i, k;
     for (i = 0; i < 4; i++) {
@@ -988,6 +1004,7 @@ static void direct_point(void)
    sphere, rectangle, triangle, and a sky of which they hide their part (their surfaces are black). */
 static void direct_together(void)
 {
+    pt_test_source("rho/pi times the sum of the irradiances");
     const pt_vec3 t[3] = {v3(-0.2, 2, 1), v3(0.5, 2.5, 1.5), v3(-0.4, 1, 2)};
     const double sphere = PT_PI * 0.25 / 8 * sqrt(0.5), square = 0.4352098756835516, triangle = lambert(t, 3);
     pt_scene sky = PT_SCENE_INIT, all = PT_SCENE_INIT;
@@ -1009,6 +1026,7 @@ static void direct_together(void)
    L2 = Le2 + rho2 (F L1 + (1 - F) L2), F = (r1/r2)^2. */
 static void concentric_spheres(void)
 {
+    pt_test_source("two linear equations with the form factor (r1/r2)^2: see the test");
     static const struct {
         double r1, r2, le1, rho1, le2, rho2;
     } row[3] = {{1, 2, 1, 0.3, 0, 0.8}, {1, 3, 0, 0.5, 1, 0.5}, {0.5, 1, 2, 0, 1, 0.9}};
@@ -1104,6 +1122,8 @@ static void check_diffuse_sphere(pt_scene *scene, double rho, pt_vec3 lamp, pt_v
 
 static void diffuse_sphere(void)
 {
+    pt_test_source("the kernel of a sphere is constant: rho^2 Phi / (4 pi^2 R^2 (1 - rho)) (Jacquez and "
+                   "Kuppenheim 1955)");
     static const double towards[3][3] = {{0.55, 0.3, -0.35}, {-1, 0.2, 0.1}, {0, -1, 0.3}};
     const pt_vec3 lamp = v3(0.6, 0.2, -0.3), other = v3(-0.1, 0.3, 0.2);
     pt_scene canonical = PT_SCENE_INIT, bright = PT_SCENE_INIT;
@@ -1191,6 +1211,7 @@ static pt_ray probe_ray(const pt_camera *camera, const cornell_row *row)
 
 static void cornell_probes(void)
 {
+    pt_test_source("tests/data/cornell_reference.csv: another program, with its standard errors");
     static const char *const band[3] = {"red", "green", "blue"};
     /* Paths in a randomisation; more where little light arrives. Probe 1 gains nothing by Sobol points and by
        a late roulette, and takes independent paths. */
@@ -1261,6 +1282,7 @@ static void check_bounces(const cornell_reference *reference, const pt_stats s[6
 
 static void cornell_bounces(void)
 {
+    pt_test_source("tests/data/cornell_reference.csv: another program, with its standard errors");
     const uint32_t n = pt_test_all_samples(1000000);
     cornell_reference reference;
     pt_scene scene = PT_SCENE_INIT;
@@ -1296,6 +1318,7 @@ static void cornell_bounces(void)
 /* The lamp itself, seen directly: its share of the picture times its radiance. */
 static void cornell_lamp(void)
 {
+    pt_test_source("area of the lamp in the picture, by its projected corners, times its radiance");
     pt_scene scene = PT_SCENE_INIT;
     pt_camera camera;
     pt_stats s[3];
@@ -1408,6 +1431,7 @@ static void check_agree(const char *name, const pt_scene *scene, const pt_camera
 
 static void agreement_rooms(void)
 {
+    pt_test_source("the other method");
     const pt_camera inside = pt_camera_look_at(v3(0.3, 1.3, 0.9), v3(-0.1, 0.5, -0.3), v3(0, 1, 0), 75);
     const pt_camera ball = pt_camera_look_at(v3(0, 1.2, 3.2), v3(0, 0.3, 0), v3(0, 1, 0), 40);
     pt_scene closed = room(), caustic = glass_ball_large_lamp();
@@ -1423,6 +1447,7 @@ static void agreement_rooms(void)
    has the narrow one. */
 static void agreement_scenes(void)
 {
+    pt_test_source("the other method");
     static const struct {
         char name[16];
         int edges;
@@ -1463,6 +1488,7 @@ static void tally_no_caustics(void *user, const char *word, int edges, pt_rgbd v
 /* The canonical glass ball: all but its caustic, which both methods find in the same way, rarely. */
 static void agreement_glass_ball(void)
 {
+    pt_test_source("the other method");
     pt_scene scene = PT_SCENE_INIT;
     pt_camera camera;
     pt_stats a[3], b[3];
@@ -1478,6 +1504,7 @@ static void agreement_glass_ball(void)
 /* The heuristics weigh differently and have the same mean. */
 static void heuristics(void)
 {
+    pt_test_source("the power heuristic");
     static const char *const name[3] = {"power", "balance", "maximum"};
     const pt_camera inside = pt_camera_look_at(v3(0.3, 1.3, 0.9), v3(-0.1, 0.5, -0.3), v3(0, 1, 0), 75);
     pt_scene scene = room();
@@ -1536,6 +1563,7 @@ static pt_stats scaled(pt_stats s, double k)
    between 16 and 512 samples would be an order wrong by ln 1.2 / ln 32 = 0.05. */
 static void one_over_root_n(void)
 {
+    pt_test_source("order -1/2: error times root of n is constant");
     const uint32_t runs = pt_test_samples(2000); /* as many of each: then their skewness cancels */
     const pt_stats few = scaled(absolute_errors(PT_SAMPLER_INDEPENDENT, 1100, runs, 16), 4);
     const pt_stats many = scaled(absolute_errors(PT_SAMPLER_INDEPENDENT, 1101, runs, 512), sqrt(512));
@@ -1856,6 +1884,7 @@ static void judge_mistake(const char *name, const pt_stats *s, double exact, mis
 
 static void mistakes_direct(void)
 {
+    pt_test_source("rho/pi E, Lambert 1760; wrong estimators must be rejected");
     static const char *const name[] = {
         "right",     "mean of both techniques", "light counted twice", "weights not 1", "area as solid angle",
         "no cosine", "no probability of choice"};
@@ -1886,6 +1915,7 @@ static void mistakes_direct(void)
 
 static void mistakes_paths(void)
 {
+    pt_test_source("geometric series; pool_radiance in the test; wrong estimators must be rejected");
     const uint32_t n = pt_test_all_samples(200000);
     pt_scene scene = pool(0, 1, 0, 1.33);
     const pt_ray ray = pool_ray(45);
