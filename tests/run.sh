@@ -119,12 +119,15 @@ over_seeds() # DIRECTORY PASSED FAILED
                 checks++
                 over3 += size > 3
                 all += off * off
-                if (size > 6.5) { bad++; print "FAIL  off by " off / sqrt(n) " standard errors on average of " n \
-                    " seeds, which is " off " of its own: " name }
+                if (size > 6.5) {
+                    bad++
+                    print "FAIL  off by " off / sqrt(n) " standard errors on average of " n " seeds, " off \
+                        " of that average: " name
+                }
                 if (size > worst) { worst = size; who = name }
             }
             if (checks) {
-                printf "\nmeans over the seeds of %d checks: rms %.3f, above 3: %d (by luck %.1f), worst %.1f: %s\n", \
+                printf "\nz over the seeds, of %d checks: rms %.3f, above 3: %d (by luck %.1f), worst %.1f: %s\n", \
                     checks, sqrt(all / checks), over3, 0.0027 * checks, worst, who
                 if (bad) failed += bad; else passed++
             }

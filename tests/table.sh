@@ -3,8 +3,8 @@
 #
 #   sh tests/table.sh LOG...      the logs of `make test`; `make test-table` does both
 #
-# Reads the lines that pt_test.h prints: the name of a test function, 'source', 'ok', 'FAIL', 'done', and lines
-# 'later TABLE N rows: REASON' of exact values that wait for a part of the program which is not written yet.
+# Reads the lines that pt_test.h prints: the name of a test function, 'source', 'ok', 'FAIL', 'done'; and
+# 'later TABLE N rows: REASON', exact values that wait for a part of the program which is not written yet.
 # Checks of one function whose names differ by numbers, methods, samplers or colours alone share a row.
 
 set -u
@@ -43,7 +43,7 @@ END
 for log in "$@"; do
     echo "== $log"
     cat "$log"
-done | awk '
+done | awk -v words='(path|plain|light|sobol|independent|stratified|red|green|blue|inner|outer)' '
     function trim(s) { sub(/^ +/, "", s); sub(/ +$/, "", s); return s }
     function cell(s) { gsub(/\|/, "\\|", s); return s }
     # What checks have in common that are alike.
@@ -51,7 +51,7 @@ done | awk '
         s = " " name " "
         gsub(/[0-9.]+(e[-+]?[0-9]+)?/, "#", s)
         gsub(/[a-z]+=[-#]+/, "#", s)
-        gsub(/[ ,:=]+(path|plain|light|sobol|independent|stratified|red|green|blue|nested|inner|outer|f#)([ ,:=]|$)/, " ", s)
+        gsub("[ ,:=]+" words "([ ,:=]|$)", " ", s)
         gsub(/[ ,;:()=#-]+/, " ", s)
         return function_name "\t" trim(s)
     }

@@ -733,10 +733,10 @@ static void check_estimate(const char *name, const stage *s, pt_render_desc d, u
         pt_check(reach <= 0.1, label("%s, interval", name), "reaches %.3g from 1: more seeds", reach);
 }
 
-/* The short form: a furnace, where paths of three edges make every pixel exactly 1 + 1/2 + 1/4. Estimated and true squared error of a picture of
-   P pixels (grey: the bands are equal) each spread by about sqrt(2 / P), and are independent: 64 seeds of 24
-   x 24 pixels give a standard error of 2 / sqrt(64 P) = 1 %, and the interval is 7 to 8 of these to each
-   side. */
+/* The short form: a furnace, where paths of three edges make every pixel exactly 1 + 1/2 + 1/4. Estimated and
+   true squared error of a picture of P pixels (grey: the bands are equal) each spread by about sqrt(2 / P),
+   and are independent: 64 seeds of 24 x 24 pixels give a standard error of 2 / sqrt(64 P) = 1 %, and the
+   interval is 7 to 8 of these to each side. */
 static void estimated_error(void)
 {
     pt_test_source("estimated over true squared error: ratio 1; truth 1 + 1/2 + 1/4, geometric series");
