@@ -30,11 +30,19 @@ SPP = 64
 
 SHARES = $(shell k=1; while [ $$k -le $(JOBS) ]; do echo $$k; k=$$((k + 1)); done)
 TESTS = $(patsubst tests/%.c,%,$(wildcard tests/test_*.c))
-SCRIPTS = docs sections switches
+# Those that take longest begin first, so that none is left alone at the end; scripts look at no numbers.
+LONGEST = $(filter test_transport test_driver test_radiometry test_oracles,$(TESTS))
+SCRIPTS = $(if $(SEED),,switches docs sections)
+STARTED = $(LONGEST:%=build/test/%.log) $(SCRIPTS:%=build/test/check_%.log) $(TESTS:%=build/test/%.log)
 TEST_LOGS = $(SCRIPTS:%=build/test/check_%.log) $(TESTS:%=build/test/%.log)
 EXAMPLES = minimal render own_threads two_files cpp_user
 
-.PHONY: all test test-long test-logs examples bench mutants clean help FORCE
+# The first and the last seed of test-seeds.
+FROM = 1
+SEEDS = 100
+TO = $(shell echo $$(($(FROM) + $(SEEDS) - 1)))
+
+.PHONY: all test test-long test-seeds test-table test-logs examples bench mutants clean help FORCE
 # A program that was built only half is no program.
 .DELETE_ON_ERROR:
 
@@ -46,6 +54,8 @@ help:
 	@echo 'make            render the Cornell box to build/cornell.ppm and .png; error against run time on stdout'
 	@echo 'make test       all checks; ends with a line "N passed, N failed"'
 	@echo 'make test-long  the same with the checks that need more samples'
+	@echo 'make test-seeds the statistical checks with other random numbers: SEEDS=100 of them, from FROM=1 on'
+	@echo 'make test-table writes tests/README.md: each quantity, its exact value, and what was measured'
 	@echo 'make examples   build and run the programs of examples/'
 	@echo 'make bench      rays per second, compile time, what leaving out saves; CSV on stdout'
 	@echo 'make mutants    break the header, one change at a time; every broken copy must fail a check; GENERATED=n ALL=1'
@@ -103,7 +113,8 @@ build/examples/cpp_user: examples/cpp_user.cpp pathtracer.h build/flags
 
 # ---- tests ---------------------------------------------------------------------------------------
 
-# Builds and runs two at a time unless make was told how many; the counts are added up at the end.
+# Builds and runs two at a time unless make was told how many; the counts are added up at the end. SEED=n runs
+# the statistical checks alone.
 test:
 	@rm -f build/test/*.log
 	@$(MAKE) --no-print-directory $(if $(findstring jobserver,$(MAKEFLAGS)),,-j$(JOBS)) -k test-logs || true
@@ -112,7 +123,19 @@ test:
 test-long:
 	@LONG=1 $(MAKE) --no-print-directory test
 
-test-logs: $(TEST_LOGS)
+# The programs are built once; then each seed takes a quarter of the samples.
+test-seeds: $(TESTS:%=build/test/%)
+	@MAKE='$(MAKE) --no-print-directory' sh tests/run.sh seeds $(FROM) $(TO)
+
+test-table: test
+	@sh tests/table.sh $(TEST_LOGS) > build/test/README.md
+	@mv build/test/README.md tests/README.md
+	@echo 'wrote tests/README.md'
+
+test-logs: $(STARTED)
+
+# Kept for the next run.
+.PRECIOUS: build/test/test_%
 
 build/test/test_%: tests/test_%.c $(wildcard tests/*.h) pathtracer.h build/flags
 	@mkdir -p build/test

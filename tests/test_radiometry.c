@@ -132,6 +132,7 @@ static void check_lamp(const row *r, pt_scene *scene)
 
 static void solid_angles_of_spheres(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: RAD-CAP, RAD-SPH, elementary");
     const row *r;
     int at;
     for (at = 0; (r = next_row("RAD-CAP", NULL, &at)) != NULL;) {
@@ -157,6 +158,7 @@ static double in_cap(const void *user, pt_sampler *s)
 
 static void directions_in_caps(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: RAD-CAP, elementary: 2 pi (1 - cos a)");
     const row *r;
     int at = 0;
     while ((r = next_row("RAD-CAP", NULL, &at)) != NULL) {
@@ -170,12 +172,16 @@ static void directions_in_caps(void)
 static void add_facing(pt_scene *scene, pt_vec3 a, pt_vec3 b, pt_vec3 c, int material)
 {
     const pt_vec3 n = pt_v3_cross(pt_v3_sub(b, a), pt_v3_sub(c, a));
-    if (dot(n, a) < 0) pt_add_triangle(scene, a, b, c, material);
-    else pt_add_triangle(scene, a, c, b, material);
+    if (dot(n, a) < 0)
+        pt_add_triangle(scene, a, b, c, material);
+    else
+        pt_add_triangle(scene, a, c, b, material);
 }
 
 static void solid_angles_of_flat_shapes(void)
 {
+    pt_test_source(
+        "tests/data/oracles_radiometry.csv: RAD-TRI (Van Oosterom and Strackee 1983), RAD-RECT, elementary");
     const pt_vec3 o = v3(0, 0, 0);
     const row *r;
     int at;
@@ -189,8 +195,10 @@ static void solid_angles_of_flat_shapes(void)
             numbers(r, corner[i], n, 3);
             v[i] = hundredfold(n);
         }
-        near_relative(row_label(r->id, "closed"), pt_solid_angle_triangle(o, v[0], v[1], v[2]), r->value, 2e-15);
-        near_relative(row_label(r->id, "turned"), pt_solid_angle_triangle(o, v[2], v[1], v[0]), r->value, 2e-15);
+        near_relative(row_label(r->id, "closed"), pt_solid_angle_triangle(o, v[0], v[1], v[2]), r->value,
+                      2e-15);
+        near_relative(row_label(r->id, "turned"), pt_solid_angle_triangle(o, v[2], v[1], v[0]), r->value,
+                      2e-15);
         near_relative(row_label(r->id, "polygon"), pt_solid_angle_polygon(o, v, 3), r->value, 2e-15);
         add_facing(&scene, v[0], v[1], v[2], lamp(&scene, 1));
         check_lamp(r, &scene);
@@ -311,6 +319,7 @@ static void disk_variances(void)
 
 static void disks(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: RAD-DISK (Paxton 1959), RAD-EDISK (Howell 2010)");
     const row *r;
     int at;
     for (at = 0; (r = next_row("RAD-DISK", NULL, &at)) != NULL;) {
@@ -334,8 +343,8 @@ static void disks(void)
         below.p.x = real(d.offset);
         below.scene = &scene;
         near_relative(row_label(r->id, "closed"), pt_irradiance_disk(1, d.r, d.h, d.offset), r->value, 3e-15);
-        check_bound(row_label(r->id, "by area"), disk_irradiance, &d, d.h < 0.5 ? 16 * POINTS : POINTS, r->value,
-                    0, BOUND, "cos cos / d^2 over pt_warp_disk");
+        check_bound(row_label(r->id, "by area"), disk_irradiance, &d, d.h < 0.5 ? 16 * POINTS : POINTS,
+                    r->value, 0, BOUND, "cos cos / d^2 over pt_warp_disk");
         add_disk(&scene, d.r, d.h, 0, lamp(&scene, 1));
         commit(&scene);
         check_irradiance(r->id, &below, d.h < 0.5 ? 4 * POINTS : POINTS, r->value, 1e-4);
@@ -393,6 +402,7 @@ static double flux_through_sphere(const void *user, pt_sampler *s)
 
 static void spots(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: RAD-SPOT, smoothstep between the cosines");
     static const double falloff[7] = {0, 0, 5.0 / 32, 0.5, 27.0 / 32, 1, 1};
     const row *r;
     int at = 0, k;
@@ -404,22 +414,24 @@ static void spots(void)
         for (k = -1; k < 6; k++) {
             const double x = 0.25 * k, c = lit.cos_end + x * (lit.cos_start - lit.cos_end);
             pt_check_near(row_label(r->id, "falloff"), pt_spot_falloff(c, lit.cos_start, lit.cos_end),
-                          falloff[k + 1], 1e-13, "see pt_spot_falloff");
+                          falloff[k + 1], 1e-13,
+                          "smooth between the two cosines: t^2 (3 - 2 t), clamped to 0 and 1");
         }
-        near_relative(row_label(r->id, "closed"), pt_flux_spot(intensity, lit.cos_start, lit.cos_end), r->value,
-                      1e-14);
+        near_relative(row_label(r->id, "closed"), pt_flux_spot(intensity, lit.cos_start, lit.cos_end),
+                      r->value, 1e-14);
         pt_add_point_light(&scene, v3(0.5, -0.25, 1), grey(intensity));
         commit(&scene);
         lit.scene = &scene;
         /* 1 - cos of 12 degrees, computed from a cosine, and cosines of single precision in its falloff */
-        check(row_label(r->id, "through a sphere"), flux_through_sphere, &lit, r->value, is_float() ? 1e-5 : 0,
-              "pt_spot_falloff or the point light");
+        check(row_label(r->id, "through a sphere"), flux_through_sphere, &lit, r->value,
+              is_float() ? 1e-5 : 0, "pt_spot_falloff or the point light");
         pt_scene_free(&scene);
     }
 }
 
 static void sphere_lights(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: RAD-ESPH (Snyder 1996)");
     const row *r;
     int at = 0;
     while ((r = next_row("RAD-ESPH", NULL, &at)) != NULL) {
@@ -428,7 +440,8 @@ static void sphere_lights(void)
         pt_scene scene = PT_SCENE_INIT;
         receiver below = {NULL, {0, 0, 0}, {0, 0, 1}};
         /* cos(90 degrees) is 6e-17 here, and E at a small sphere near the horizon has a slope of 1 / cos */
-        near_relative(row_label(r->id, "closed"), pt_irradiance_sphere(1, radius, d, cos(beta)), r->value, 1e-13);
+        near_relative(row_label(r->id, "closed"), pt_irradiance_sphere(1, radius, d, cos(beta)), r->value,
+                      1e-13);
         below.scene = &scene;
         pt_add_sphere(&scene, v3(d * sin(beta), 0, d * cos(beta)), real(radius), lamp(&scene, 1));
         commit(&scene);
@@ -448,8 +461,10 @@ static void check_polygon(const row *r, const double (*v)[3], int count, int as_
     int i;
     if (as_parallelogram) {
         const pt_vec3 e1 = pt_v3_sub(b, a), e2 = pt_v3_sub(v3(v[3][0], v[3][1], v[3][2]), a);
-        if (dot(pt_v3_cross(e1, e2), a) < 0) pt_add_parallelogram(&scene, a, e1, e2, material);
-        else pt_add_parallelogram(&scene, a, e2, e1, material);
+        if (dot(pt_v3_cross(e1, e2), a) < 0)
+            pt_add_parallelogram(&scene, a, e1, e2, material);
+        else
+            pt_add_parallelogram(&scene, a, e2, e1, material);
     }
     for (i = 1; i + 1 < count && !as_parallelogram; i++)
         add_facing(&scene, a, v3(v[i][0], v[i][1], v[i][2]), v3(v[i + 1][0], v[i + 1][1], v[i + 1][2]),
@@ -463,6 +478,7 @@ static void check_polygon(const row *r, const double (*v)[3], int count, int as_
 
 static void polygon_lights(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: RAD-EPOLY (Lambert 1760)");
     const row *r;
     int at = 0;
     while ((r = next_row("RAD-EPOLY", NULL, &at)) != NULL) {
@@ -481,6 +497,7 @@ static void polygon_lights(void)
 
 static void regular_polygons(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: RAD-NGON (Lambert 1760)");
     const row *r;
     int at = 0;
     while ((r = next_row("RAD-NGON", NULL, &at)) != NULL) {
@@ -502,8 +519,8 @@ static void regular_polygons(void)
         }
         near_relative(row_label(r->id, "triangles"), sum, r->value, tolerance);
         if (n <= 32)
-            near_relative(row_label(r->id, "closed"), pt_irradiance_polygon(1, v3(0, 0, 0), v3(0, 0, 1), v, n),
-                          r->value, tolerance);
+            near_relative(row_label(r->id, "closed"),
+                          pt_irradiance_polygon(1, v3(0, 0, 0), v3(0, 0, 1), v, n), r->value, tolerance);
         commit(&scene);
         below.scene = &scene;
         check_irradiance(r->id, &below, POINTS, r->value, 0);
@@ -533,6 +550,7 @@ static double sky_deviation(const void *user, pt_sampler *s)
 
 static void skies(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: RAD-SKY, elementary");
     const row *r;
     int at = 0;
     double mean = 0; /* its row stands before those of the variances */
@@ -568,6 +586,7 @@ static void skies(void)
    instead, which adds up to pi. The floor ends a millionth below the true horizon. */
 static void tilted_planes(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: RAD-TILT, elementary: pi (1 + cos t)/2");
     const double size = 1e6;
     const row *r;
     int at = 0;
@@ -602,7 +621,8 @@ static void bulb(const row *r, double intensity)
     const double radius = 0.03, flux = parameter(r, "Phi_lm"), d = 2;
     pt_scene scene = PT_SCENE_INIT;
     receiver below = {NULL, {0, 0, 0}, {0, 1, 0}};
-    near_relative(row_label(r->id, "closed"), pt_exitance(r->value) * 4 * PT_PI * radius * radius, flux, 1e-15);
+    near_relative(row_label(r->id, "closed"), pt_exitance(r->value) * 4 * PT_PI * radius * radius, flux,
+                  1e-15);
     near_relative(row_label(r->id, "illuminance"), pt_irradiance_sphere(r->value, radius, d, 1),
                   pt_irradiance_point(intensity, d, 1), 1e-14);
     pt_add_sphere(&scene, v3(0, d, 0), real(radius), lamp(&scene, r->value));
@@ -615,6 +635,7 @@ static void bulb(const row *r, double intensity)
 
 static void photometry(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: RAD-PHOT, definition of the candela in the SI");
     /* 540 THz is 555.017 nm, where V is below its greatest value by less than 1e-5 */
     const double nm = 299792458e9 / 540e12;
     double bar[3], intensity = 0; /* its row stands before that of the bulb */
@@ -622,7 +643,7 @@ static void photometry(void)
     int at = 0;
     pt_cie_xyz(nm, bar);
     pt_check_near("683 lm/W at 540 THz", PT_LUMENS_PER_WATT * bar[1], 683, 683 * 1e-5,
-                  "see PT_LUMENS_PER_WATT");
+                  "lm/W at 555 nm; a weight by ybar must follow");
     while ((r = next_row("RAD-PHOT", NULL, &at)) != NULL) {
         const double flux = parameter(r, "Phi_lm");
         if (strcmp(r->quantity, "I_cd") == 0) {
@@ -671,8 +692,10 @@ static double peak(double kelvin)
     int i;
     for (i = 0; i < 60; i++) {
         const double x = b - golden * (b - a), y = a + golden * (b - a);
-        if (pt_blackbody(x, kelvin) < pt_blackbody(y, kelvin)) a = x;
-        else b = y;
+        if (pt_blackbody(x, kelvin) < pt_blackbody(y, kelvin))
+            a = x;
+        else
+            b = y;
     }
     return 0.5 * (a + b);
 }
@@ -686,6 +709,7 @@ static double one_wavelength(const void *user, pt_sampler *s)
 
 static void black_bodies(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: RAD-BB, Planck's law, CODATA 2019");
     double exitance = 0;
     const row *r;
     int at = 0;
@@ -704,8 +728,9 @@ static void black_bodies(void)
             near_relative(r->id, pt_blackbody(peak(t), t) * 1e9, r->value, 2e-14);
         } else {
             near_relative(r->id, integrated_band(t, 360, 830) / exitance, r->value, 1e-12);
-            check(row_label(r->id, "by wavelengths"), one_wavelength, &t, r->value * exitance, 0,
-                  "see pt_blackbody");
+            check(
+                row_label(r->id, "by wavelengths"), one_wavelength, &t, r->value * exitance, 0,
+                "Planck: 2 h c^2 / lambda^5 / (exp(h c / (lambda k T)) - 1), times 1e-9 to be per nanometre");
         }
     }
 }
@@ -722,8 +747,8 @@ static void luminous_efficacy(void)
             pt_cie_xyz(360 + 0.01 * i, bar);
             sum += bar[1] * pt_blackbody(360 + 0.01 * i, t) * 0.01;
         }
-        near_relative(row_label(r->id, "efficacy"), pt_blackbody_efficacy(t), 683.002 * PT_PI * sum / r->value,
-                      1e-4);
+        near_relative(row_label(r->id, "efficacy"), pt_blackbody_efficacy(t),
+                      683.002 * PT_PI * sum / r->value, 1e-4);
     }
     pt_check_near("a light bulb of 2700 K", pt_blackbody_efficacy(2700), 12.4, 0.1, "lm/W");
 }
@@ -743,14 +768,14 @@ static void colours(void)
         xyz[axis] = r->value;
         if (axis == 1)
             pt_check_near(row_label(r->id, "luminance"), pt_luminance(band == 'R', band == 'G', band == 'B'),
-                          r->value, unit * r->value, "see pt_luminance");
+                          r->value, unit * r->value, "0.2126, 0.7152, 0.0722 of linear sRGB: no gamma");
         if (axis == 2) {
             const pt_rgbd c = pt_xyz_to_rgb(xyz);
             const double got[3] = {c.r, c.g, c.b};
             int k;
             for (k = 0; k < 3; k++)
                 pt_check_near(row_label(r->id, "to linear sRGB"), got[k], bands[k] == band, 2 * unit,
-                              "see pt_xyz_to_rgb");
+                              "the matrix of sRGB with white D65, rows not columns");
         }
     }
     for (at = 0; (r = next_row("RAD-SRGBTF", "encoded", &at)) != NULL;)
@@ -811,20 +836,20 @@ static patch on_floor(double x0, double x1, double z0, double z1)
 
 static void rectangles(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: VF-PAR, VF-PERP (Howell 2010)");
     const row *r;
     int at;
     near_relative("squares far apart", 1e12 * PT_PI * pt_form_factor_parallel(1, 1, 1e6), 1, 1e-11);
     for (at = 0; (r = next_row("VF-PAR", "F12", &at)) != NULL;) {
         const double a = parameter(r, "a"), b = parameter(r, "b"), c = parameter(r, "c");
-        near_relative(row_label(r->id, "closed"), pt_form_factor_parallel(a, b, c), r->value,
-                      2e-14);
+        near_relative(row_label(r->id, "closed"), pt_form_factor_parallel(a, b, c), r->value, 2e-14);
         check_form_factor(r, on_floor(0, a, 0, b), v3(0, c, 0), v3(a, 0, 0), v3(0, 0, b));
     }
     for (at = 0; (r = next_row("VF-PERP", "F12", &at)) != NULL;) {
         const double w = parameter(r, "w"), h = parameter(r, "h"), l = parameter(r, "l");
         near_relative(row_label(r->id, "closed"), pt_form_factor_perpendicular(w, h, l), r->value, 2e-14);
-        near_relative(row_label(r->id, "reciprocity"), pt_form_factor_perpendicular(h, w, l) * h / w, r->value,
-                      2e-14);
+        near_relative(row_label(r->id, "reciprocity"), pt_form_factor_perpendicular(h, w, l) * h / w,
+                      r->value, 2e-14);
         check_form_factor(r, on_floor(0, w, 0, l), v3(0, 0, 0), v3(0, h, 0), v3(0, 0, l));
     }
 }
@@ -844,6 +869,7 @@ static double parallel_in_general(const double a[4], const double b[4], double c
 
 static void rectangles_in_general_position(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: VF-PAROFF (Howell 2010)");
     const row *r;
     int at = 0;
     while ((r = next_row("VF-PAROFF", "F12", &at)) != NULL) {
@@ -859,6 +885,7 @@ static void rectangles_in_general_position(void)
 
 static void strips(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: VF-STRIP, VF-WEDGE (Hottel's crossed strings)");
     const row *r;
     int at;
     for (at = 0; (r = next_row("VF-STRIP", "F12", &at)) != NULL;) {
@@ -909,6 +936,7 @@ static double mean_irradiance(const void *user, pt_sampler *s)
 
 static void coaxial_disks(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: VF-DISK (Howell 2010)");
     const row *r;
     int at = 0;
     while ((r = next_row("VF-DISK", "F12", &at)) != NULL) {
@@ -918,7 +946,8 @@ static void coaxial_disks(void)
         from.r = parameter(r, "r1");
         from.r2 = parameter(r, "r2");
         from.h = parameter(r, "h");
-        near_relative(row_label(r->id, "closed"), pt_form_factor_disks(from.r, from.r2, from.h), r->value, 2e-15);
+        near_relative(row_label(r->id, "closed"), pt_form_factor_disks(from.r, from.r2, from.h), r->value,
+                      2e-15);
         check(row_label(r->id, "irradiance"), mean_irradiance, &from, r->value, 0,
               "the mean of pt_irradiance_disk");
         add_disk(&scene, from.r2, from.h, 0, lamp(&scene, 1));
@@ -948,14 +977,15 @@ static double flux_onto_disk(const void *user, pt_sampler *s)
 
 static void sphere_and_disk(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: VF-SPHDISK (Howell 2010)");
     const row *r;
     int at = 0;
     while ((r = next_row("VF-SPHDISK", "F_sd", &at)) != NULL) {
         const double radius = parameter(r, "r"), h = parameter(r, "h");
         pt_scene scene = PT_SCENE_INIT;
         near_relative(row_label(r->id, "closed"), pt_form_factor_sphere_disk(radius, h), r->value, 1e-15);
-        near_relative(row_label(r->id, "solid angle"), pt_solid_angle_disk(radius, h, 0) / (4 * PT_PI), r->value,
-                      1e-15);
+        near_relative(row_label(r->id, "solid angle"), pt_solid_angle_disk(radius, h, 0) / (4 * PT_PI),
+                      r->value, 1e-15);
         pt_add_sphere(&scene, v3(0, 0, 0), real(0.5 * h), lamp(&scene, 2));
         add_disk(&scene, radius, h, 0, wall(&scene, 0));
         commit(&scene);
@@ -989,6 +1019,7 @@ static double onto_inner_cylinder(const void *user, pt_sampler *s)
 
 static void concentric(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: VF-CONC, reciprocity");
     const row *r;
     int at = 0;
     while ((r = next_row("VF-CONC", NULL, &at)) != NULL) {
@@ -1053,6 +1084,7 @@ static double side_to_side(const void *user, pt_sampler *s)
 
 static void closed_cylinders(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: VF-CYL (Howell 2010)");
     const row *r;
     int at = 0;
     while ((r = next_row("VF-CYL", NULL, &at)) != NULL) {
@@ -1066,8 +1098,8 @@ static void closed_cylinders(void)
         near_relative(row_label(r->id, "closed"), sideways ? 1 - c.r / c.h * (1 - across) : across, r->value,
                       1e-14);
         make_cylinder(&c);
-        check_hits(row_label(r->id, "rays"), sideways ? side_to_side : base_to_top, &c, r->value, r->value, 1e-4,
-                   "rays within a closed cylinder");
+        check_hits(row_label(r->id, "rays"), sideways ? side_to_side : base_to_top, &c, r->value, r->value,
+                   1e-4, "rays within a closed cylinder");
         pt_scene_free(&c.scene);
     }
 }
@@ -1105,6 +1137,8 @@ static double bowl_to_itself(const void *user, pt_sampler *s)
 
 static void bowls(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: VF-SPHCAV, the kernel of a sphere is constant "
+                   "(Jacquez and Kuppenheim 1955)");
     const row *r;
     int at = 0;
     while ((r = next_row("VF-SPHCAV", "F_self", &at)) != NULL) {
@@ -1178,6 +1212,7 @@ static int face_of(const char *quantity)
 
 static void cube_by_reflections(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: VF-CUBE1, quadrature of products of form factors");
     const double fo = pt_form_factor_parallel(1, 1, 1), fa = pt_form_factor_perpendicular(1, 1, 1);
     const row *r;
     int at = 0;
@@ -1261,6 +1296,7 @@ static double wall_radiance(const void *user, pt_sampler *s)
 
 static void integrating_spheres(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: VF-ISPH (Jacquez and Kuppenheim 1955)");
     const row *r;
     int at = 0;
     while ((r = next_row("VF-ISPH", NULL, &at)) != NULL) {
@@ -1299,6 +1335,7 @@ static double lit_wall(const void *user, pt_sampler *s)
 
 static void spheres_around_point_lights(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: VF-ISPHPT (Jacquez and Kuppenheim 1955)");
     const row *r;
     int at = 0;
     while ((r = next_row("VF-ISPHPT", "L", &at)) != NULL) {
@@ -1334,6 +1371,7 @@ static double between_spheres(const void *user, pt_sampler *s)
 
 static void concentric_spheres_that_shine(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: VF-CSPH, reciprocity and symmetry");
     static const char *const keys[2][3] = {{"r1", "rho1", "Le1"}, {"r2", "rho2", "Le2"}};
     const row *r;
     int at = 0, k;
