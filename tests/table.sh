@@ -37,7 +37,7 @@ All statistical checks of a run together fail by luck once in a million runs. Th
 Student's t. "Rejected" marks an estimator with a planted mistake, which passes only if it is found wrong.
 Values too skewed for such a verdict make a check invalid, which is a failure. See `tests/pt_test.h`.
 
-The seconds are those of one run on an ordinary two-core machine.
+The seconds are those of one run on an ordinary two-core machine that had other work to do as well.
 END
 
 for log in "$@"; do
