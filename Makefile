@@ -30,13 +30,21 @@ SPP = 64
 
 SHARES = $(shell k=1; while [ $$k -le $(JOBS) ]; do echo $$k; k=$$((k + 1)); done)
 TESTS = $(patsubst tests/%.c,%,$(wildcard tests/test_*.c))
-SCRIPTS = docs sections switches
+# Those that take longest begin first, so that none is left alone at the end; scripts look at no numbers.
+LONGEST = $(filter test_transport test_driver test_radiometry test_oracles,$(TESTS))
+SCRIPTS = $(if $(SEED),,switches docs sections)
+STARTED = $(LONGEST:%=build/test/%.log) $(SCRIPTS:%=build/test/check_%.log) $(TESTS:%=build/test/%.log)
 TEST_LOGS = $(SCRIPTS:%=build/test/check_%.log) $(TESTS:%=build/test/%.log)
 EXAMPLES = minimal render scenes own_threads two_files cpp_user
 # Samples per pixel of the contact sheet.
 SHEET_SPP = 128
 
-.PHONY: all scenes test test-long test-logs examples bench mutants clean help FORCE
+# The first and the last seed of test-seeds.
+FROM = 1
+SEEDS = 100
+TO = $(shell echo $$(($(FROM) + $(SEEDS) - 1)))
+
+.PHONY: all scenes test test-long test-seeds test-table test-logs examples bench mutants clean help FORCE
 # A program that was built only half is no program.
 .DELETE_ON_ERROR:
 
@@ -49,9 +57,11 @@ help:
 	@echo 'make scenes     all scenes, bounces, methods and classes of light paths in build/scenes.png'
 	@echo 'make test       all checks; ends with a line "N passed, N failed"'
 	@echo 'make test-long  the same with the checks that need more samples'
+	@echo 'make test-seeds the statistical checks with other random numbers: SEEDS=100 of them, from FROM=1 on'
+	@echo 'make test-table writes tests/README.md: each quantity, its exact value, and what was measured'
 	@echo 'make examples   build and run the programs of examples/'
 	@echo 'make bench      rays per second, compile time, what leaving out saves; CSV on stdout'
-	@echo 'make mutants    break the header in known ways; every broken copy must fail a check'
+	@echo 'make mutants    break the header, one change at a time; every broken copy must fail a check; GENERATED=n ALL=1'
 	@echo 'make clean      remove build/'
 	@echo 'variables       CC CFLAGS LDFLAGS EXTRA JOBS; SHORT=1 SEED=n for the tests; SCENE SIZE SPP for plain make'
 
@@ -114,7 +124,8 @@ build/examples/cpp_user: examples/cpp_user.cpp pathtracer.h build/flags
 
 # ---- tests ---------------------------------------------------------------------------------------
 
-# Builds and runs two at a time unless make was told how many; the counts are added up at the end.
+# Builds and runs two at a time unless make was told how many; the counts are added up at the end. SEED=n runs
+# the statistical checks alone.
 test:
 	@rm -f build/test/*.log
 	@$(MAKE) --no-print-directory $(if $(findstring jobserver,$(MAKEFLAGS)),,-j$(JOBS)) -k test-logs || true
@@ -123,7 +134,19 @@ test:
 test-long:
 	@LONG=1 $(MAKE) --no-print-directory test
 
-test-logs: $(TEST_LOGS)
+# The programs are built once; then each seed takes a quarter of the samples.
+test-seeds: $(TESTS:%=build/test/%)
+	@MAKE='$(MAKE) --no-print-directory' sh tests/run.sh seeds $(FROM) $(TO)
+
+test-table: test
+	@sh tests/table.sh $(TEST_LOGS) > build/test/README.md
+	@mv build/test/README.md tests/README.md
+	@echo 'wrote tests/README.md'
+
+test-logs: $(STARTED)
+
+# Kept for the next run.
+.PRECIOUS: build/test/test_%
 
 build/test/test_%: tests/test_%.c $(wildcard tests/*.h) pathtracer.h build/flags
 	@mkdir -p build/test
@@ -148,11 +171,13 @@ build/mutants/run: tests/mutants.c build/flags
 	@mkdir -p build/mutants
 	$(BUILD_C) tests/mutants.c -o $@
 
-# JOBS shares of the list at a time. ONLY=name takes one mutant.
+# JOBS shares at a time. GENERATED=n draws n changes that nobody chose, ALL=1 tries also those that are listed
+# as no error, ONLY=name takes one mutant.
+GENERATED ?= 200
 mutants: build/mutants/run
 	@rm -f build/mutants/share*.log
 	@for k in $(if $(ONLY),1,$(SHARES)); do \
 	    CC='$(CC)' sh tests/run.sh one build/mutants/share$$k.log build/mutants/run \
-	        $(if $(ONLY),--only $(ONLY),--share $$k/$(JOBS)) $(TESTS) & \
+	        $(if $(ONLY),--only $(ONLY),--share $$k/$(JOBS)) --generate $(GENERATED) $(if $(ALL),--all) $(TESTS) & \
 	done; wait
 	@sh tests/run.sh sum build/mutants/share*.log

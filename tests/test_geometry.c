@@ -291,7 +291,8 @@ static void bad_numbers(void)
         const pt_ray good = ray_of(fine, down);
         pt_check(!pt_intersect_sphere(&good, pt_v3(0, 0, 0), -1, &t) &&
                      !pt_intersect_sphere(&good, pt_v3(0, 0, 0), nan, &t),
-                 "a sphere without radius is missed", "see pt_intersect_sphere");
+                 "a sphere without radius is missed",
+                 "with r = 0 the discriminant is rounding noise: such a sphere must never be met");
     }
 }
 
@@ -702,6 +703,26 @@ static int ask_for_light(const pt_scene *scene, pt_pcg32 *rng, vec at, double si
 
 /* Nothing is between a floor and lamps of all sizes, so nothing may occlude. A ray a little longer meets the
    lamp itself (unless it grazes a rim): it ended at the lamp, not before. */
+/* What stands before the end of a shadow ray shadows, by however little, near and far; at its end it does not. */
+static void before_the_end(void)
+{
+    int k, i;
+    for (k = -6; k <= 6; k++)
+        for (i = 0; i < 2; i++) {
+            const double d = pow(10, k), gap = 1e-5 * d;
+            pt_scene scene = PT_SCENE_INIT;
+            const int white = pt_add_material(&scene, pt_material_diffuse(pt_rgb_grey((pt_real)0.5)));
+            const pt_ray ray = {real3(vec3(0, 0, 0)), real3(vec3(d, 0, 0)), 1};
+            if (i == 0) pt_add_sphere(&scene, real3(vec3(d - gap - 0.01 * d, 0, 0)), (pt_real)(0.01 * d), white);
+            else
+                pt_add_triangle(&scene, real3(vec3(d - gap, -d, -d)), real3(vec3(d - gap, 2 * d, -d)),
+                                real3(vec3(d - gap, -d, 2 * d)), white);
+            pt_check(pt_commit(&scene) == PT_OK && pt_occluded(&scene, &ray), "just before the end",
+                     "distance 1e%d: %s does not shadow", k, i ? "a triangle" : "a sphere");
+            pt_scene_free(&scene);
+        }
+}
+
 static void shadow_rays(void)
 {
     static const double sizes[7] = {1e-3, 0.03, 1, 30, 1e3, 1e5, 1e6}, offsets[3] = {0, 25, 100};
@@ -801,14 +822,15 @@ static int linear(const pt_scene *scene, const pt_ray *ray, double *t)
 }
 
 #if PTI_HAS_BVH
-/* Depth of the tree below a node; -1 if a box does not hold what is in it, or a primitive is met twice. */
+/* Depth of the tree below a node; -1 if a box does not hold what is in it, a primitive is met
+   twice, or a leaf has more than eight. */
 static int check_node(const pt_bvh *bvh, uint32_t node, const pt_vec3 *lo, const pt_vec3 *hi,
                       unsigned char *seen, int depth)
 {
     const pt_bvh_node *const n = &bvh->nodes[node];
     uint32_t i;
     int deepest = depth, child;
-    if (depth > PT_BVH_MAX_DEPTH || node >= bvh->node_count) return -1;
+    if (depth > PT_BVH_MAX_DEPTH || node >= bvh->node_count || n->count > 8) return -1;
     for (i = 0; n->count > 0 && i < n->count; i++) {
         const uint32_t p = bvh->order[n->first + i];
         if (p >= bvh->primitive_count || seen[p]++) return -1;
@@ -847,6 +869,115 @@ static void one_tree(const char *name, const pt_vec3 *lo, const pt_vec3 *hi, uin
     if (count == 0) pt_check(bvh.node_count == 0, name, "an empty tree has no nodes");
     pt_bvh_free(&bvh, NULL);
     free(seen);
+}
+
+/* What a split of the node's boxes costs: half areas times counts, left and right of plane `bin` (of 15) of an
+   axis, in units of the half area of all; HUGE_VAL if all are on one side. `left` gets their number. */
+enum { SPLIT_BINS = 16, SPLIT_MOST = 600 };
+
+typedef struct split_boxes {
+    const pt_vec3 *lo, *hi;
+    const uint32_t *order; /* of the node's primitives */
+    uint32_t count;
+} split_boxes;
+
+static double coordinate(pt_vec3 v, int axis) { return dbl(axis == 0 ? v.x : axis == 1 ? v.y : v.z); }
+
+static double half_area(const split_boxes *b, const unsigned char *side, int wanted, uint32_t *count)
+{
+    double low[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, high[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
+    uint32_t i;
+    int k;
+    for (*count = i = 0; i < b->count; i++) {
+        if (side[i] != wanted) continue;
+        ++*count;
+        for (k = 0; k < 3; k++) {
+            low[k] = fmin(low[k], coordinate(b->lo[b->order[i]], k));
+            high[k] = fmax(high[k], coordinate(b->hi[b->order[i]], k));
+        }
+    }
+    for (k = 0; k < 3; k++) high[k] -= low[k];
+    return *count ? high[0] * high[1] + high[1] * high[2] + high[2] * high[0] : 0;
+}
+
+static double split_cost(const split_boxes *b, int axis, int plane)
+{
+    unsigned char side[SPLIT_MOST];
+    double low = HUGE_VAL, high = -HUGE_VAL, left, right;
+    uint32_t i, n_left, n_right;
+    for (i = 0; i < b->count; i++) {
+        const pt_vec3 c = pt_v3_add(b->lo[b->order[i]], b->hi[b->order[i]]);
+        low = fmin(low, coordinate(c, axis));
+        high = fmax(high, coordinate(c, axis));
+    }
+    if (!(high > low)) return HUGE_VAL;
+    for (i = 0; i < b->count; i++) {
+        const double c = coordinate(b->lo[b->order[i]], axis) + coordinate(b->hi[b->order[i]], axis);
+        side[i] = (c - low) * (SPLIT_BINS / (high - low)) >= plane;
+    }
+    left = half_area(b, side, 0, &n_left);
+    right = half_area(b, side, 1, &n_right);
+    return n_left > 0 && n_right > 0 ? left * n_left + right * n_right : HUGE_VAL;
+}
+
+/* Collects what is below a node; how many. */
+static uint32_t below(const pt_bvh *bvh, uint32_t node, uint32_t *order)
+{
+    const pt_bvh_node *const n = &bvh->nodes[node];
+    uint32_t i, count;
+    for (i = 0; i < n->count; i++) order[i] = bvh->order[n->first + i];
+    if (n->count > 0) return n->count;
+    count = below(bvh, n->first, order);
+    return count + below(bvh, n->first + 1, order + count);
+}
+
+/* A node is split where the surface area heuristic is least over the planes between sixteen bins an axis, and
+   is a leaf where up to eight boxes are cheaper so. Returns the number of nodes of which that is not true. */
+static int wrong_splits(const pt_bvh *bvh, const pt_vec3 *lo, const pt_vec3 *hi)
+{
+    uint32_t order[SPLIT_MOST], node, count[2];
+    unsigned char side[SPLIT_MOST];
+    int wrong = 0, axis, plane;
+    for (node = 0; node < bvh->node_count; node++) {
+        const pt_bvh_node *const n = &bvh->nodes[node];
+        const split_boxes b = {lo, hi, order, below(bvh, node, order)};
+        double best = HUGE_VAL, cost, area;
+        for (axis = 0; axis < 3; axis++)
+            for (plane = 1; plane < SPLIT_BINS; plane++) best = fmin(best, split_cost(&b, axis, plane));
+        memset(side, 0, b.count);
+        area = half_area(&b, side, 0, &count[0]);
+        if (n->count == 0) {
+            count[0] = below(bvh, n->first, order); /* the left child's come first */
+            memset(side + count[0], 1, b.count - count[0]);
+            cost = half_area(&b, side, 0, &count[0]) * count[0];
+            cost += half_area(&b, side, 1, &count[1]) * count[1];
+            wrong += fabs(cost - best) > 1e-12 * best || (b.count <= 8 && !(best + area < area * b.count));
+        } else {
+            wrong += b.count > 8 || (b.count > 1 && best + area < area * b.count);
+        }
+    }
+    return wrong;
+}
+
+static void tree_splits(void)
+{
+    pt_vec3 lo[SPLIT_MOST], hi[SPLIT_MOST];
+    pt_pcg32 rng = pt_pcg32_make(pt_test_seed(26), 26);
+    pt_bvh bvh;
+    int i, flat, wrong;
+    for (flat = 0; flat < 4; flat++) { /* boxes with sides, or without one along the axis flat - 1 */
+        for (i = 0; i < SPLIT_MOST; i++) {
+            const vec c = random_vec(&rng, flat == 1 ? 100 : 10), d = vec3(uniform(&rng, 0, 3), uniform(&rng, 0, 2), uniform(&rng, 0, 1));
+            lo[i] = real3(vec3(flat == 1 ? 0 : c.x, flat == 2 ? 0 : c.y, flat == 3 ? 0 : c.z));
+            hi[i] = pt_v3_add(lo[i], real3(vec3(flat == 1 ? 0 : d.x, flat == 2 ? 0 : d.y, flat == 3 ? 0 : d.z)));
+        }
+        pt_check(pt_bvh_build(&bvh, lo, hi, SPLIT_MOST, NULL) == PT_OK, "tree of 600 boxes", "was not built");
+        wrong = wrong_splits(&bvh, lo, hi);
+        pt_check(wrong == 0 && bvh.node_count > 200, label("splits by surface area, %d", flat),
+                 "%d of %u nodes are not split where the heuristic is least", wrong, (unsigned)bvh.node_count);
+        pt_bvh_free(&bvh, NULL);
+    }
+    pt_check(pt_bvh_build(&bvh, lo, hi, 0x80000000u, NULL) == PT_ERROR_ARGUMENT, "2^31 boxes", "are not refused");
 }
 
 static void tree_shapes(void)
@@ -1074,9 +1205,11 @@ int main(int argc, char **argv)
     PT_TEST_EXACT(what_a_hit_says);
     PT_TEST_EXACT(shading_normals);
     PT_TEST_EXACT(shadow_rays);
+    PT_TEST_EXACT(before_the_end);
     PT_TEST_EXACT(thin_gaps);
 #if PTI_HAS_BVH
     PT_TEST_EXACT(tree_shapes);
+    PT_TEST_EXACT(tree_splits);
 #endif
     PT_TEST_EXACT(tree_is_linear_search);
     PT_TEST_EXACT(ties);

@@ -794,8 +794,8 @@ static void bad_rays(void)
         pt_sampler_start(&sampler, 0, 0);
         v = pt_li_path(&s, &r, &sampler, &options, &info);
         /* pt_li_path looks as far as there is anything: tmax does not matter */
-        pt_check(v.r == (i >= 1 && i <= 3) && v.g == v.r && v.b == v.r, label("ray with %s, radiance", name[i]),
-                 "%g", v.r);
+        pt_check(v.r == (i >= 1 && i <= 3) && v.g == v.r && v.b == v.r,
+                 label("ray with %s, radiance", name[i]), "%g", v.r);
     }
     pt_scene_free(&s);
 }

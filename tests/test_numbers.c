@@ -55,7 +55,8 @@ static void normalize(void)
     static const double scale[] = {1, 1e-45, 1e-38, 1e-19, 1e-10, 1e10, 1e19, 1e37};
     size_t i;
     pt_vec3 zero = pt_v3_normalize(pt_v3(0, 0, 0));
-    pt_check(zero.x == 0 && zero.y == 0 && zero.z == 0, "the zero vector stays zero", "see pt_v3_normalize");
+    pt_check(zero.x == 0 && zero.y == 0 && zero.z == 0, "the zero vector stays zero",
+             "0 / 0 would be NaN: test the length before dividing");
     for (i = 0; i < sizeof scale / sizeof scale[0]; i++) {
         const pt_real s = (pt_real)scale[i];
         const pt_vec3 a = pt_v3(3 * s, -2 * s, 6 * s), u = pt_v3_normalize(a);
@@ -101,8 +102,9 @@ static void frames(void)
     for (; file && pt_case_next(file, "onb", &c); rows++) one_frame(&c);
     if (file) fclose(file);
     pt_check(rows == 18, "rows of frames", "%d", rows);
-    pt_check((double)pt_v3_length(pt_v3_sub(back, v)) <= 20 * pt_gamma(1), "to world and back",
-             "see pt_frame_to_local");
+    pt_check(
+        (double)pt_v3_length(pt_v3_sub(back, v)) <= 20 * pt_gamma(1), "to world and back",
+        "to_world by the three axes, to_local by dot products with them: one is the inverse of the other");
 }
 
 static void one_code(const pt_case *c)
@@ -193,7 +195,8 @@ static void pcg32(void)
     pt_check(rows == 19, "rows of PCG32", "%d", rows);
     for (i = 0; i < 155; i++) pt_pcg32_next(&step);
     pt_pcg32_advance(&jump, 155);
-    pt_check(step.state == jump.state, "155 draws are one advance", "see pt_pcg32_advance");
+    pt_check(step.state == jump.state, "155 draws are one advance",
+             "a jump of n steps is x -> a^n x + c (a^n - 1) / (a - 1), by squaring");
 }
 
 static void one_conversion(const pt_case *c)
@@ -331,6 +334,7 @@ static void expect_uniform(const char *name, const double *counts, int cells, co
 /* Over the seeds every scrambled value is uniform. */
 static void owen_uniform(void)
 {
+    pt_test_source("a scrambled number is uniform over seeds (Owen 1995)");
     static const uint32_t values[3] = {0, 0x80000000u, 0xcafebabeu};
     const uint32_t n = pt_test_samples(1u << 18);
     int i;
@@ -339,13 +343,15 @@ static void owen_uniform(void)
         uint32_t seed;
         for (seed = 0; seed < n; seed++)
             counts[pt_owen_scramble(values[i], (uint32_t)pt_hash64(pt_test_seed(seed))) >> 24]++;
-        expect_uniform("scrambled top byte over seeds", counts, 256, "see pt_owen_scramble");
+        expect_uniform("scrambled top byte over seeds", counts, 256,
+                       "each bit is flipped by a hash of the bits above it and of the seed");
     }
 }
 
 /* Flip any input bit of the hash: every byte of the change is uniform. */
 static void avalanche(void)
 {
+    pt_test_source("flipped bits of a good hash are fair coins");
     static double counts[8][256];
     pt_pcg32 rng = pt_pcg32_make(pt_test_seed(1), 1);
     const uint32_t n = pt_test_samples(1u << 17);
@@ -358,11 +364,13 @@ static void avalanche(void)
         for (byte = 0; byte < 8; byte++) counts[byte][change >> (8 * byte) & 255]++;
     }
     for (byte = 0; byte < 8; byte++)
-        expect_uniform("change of a byte of the hash", counts[byte], 256, "see pt_hash64");
+        expect_uniform("change of a byte of the hash", counts[byte], 256,
+                       "each bit of the input must change each bit of the output half of the time");
 }
 
 static void pcg32_uniform(void)
 {
+    pt_test_source("uniform distribution");
     double counts[1024] = {0};
     pt_pcg32 rng = pt_pcg32_make(pt_test_seed(2), 2);
     const uint32_t n = pt_test_samples(1u << 19);
@@ -374,7 +382,7 @@ static void pcg32_uniform(void)
         counts[(int)(u * 1024) & 1023]++;
     }
     pt_check(inside, "pt_pcg32_double is in [0,1)", "it was not");
-    expect_uniform("pt_pcg32_double", counts, 1024, "see pt_pcg32_double");
+    expect_uniform("pt_pcg32_double", counts, 1024, "top bits of the integer times 2^-k, k their number");
 }
 
 static const pt_sampler_kind kinds[3] = {PT_SAMPLER_SOBOL, PT_SAMPLER_INDEPENDENT, PT_SAMPLER_STRATIFIED};
@@ -497,6 +505,7 @@ static void strata(void)
 /* Each number alone is uniform when the seed varies: no sampler is biased. */
 static void uniform_over_seeds(void)
 {
+    pt_test_source("uniform distribution: randomised points are each uniform");
     static const char *const names[3] = {"sobol over seeds", "independent over seeds",
                                          "stratified over seeds"};
     const uint32_t n = pt_test_samples(1u << 17);
@@ -542,6 +551,7 @@ static void neighbours(const char *name, pt_sampler_kind kind, unsigned next_str
 
 static void independence(void)
 {
+    pt_test_source("uniform distribution on the square: pairs that must be independent");
     neighbours("independent, neighbouring pixels", PT_SAMPLER_INDEPENDENT, 1, 0, 3, 11);
     neighbours("independent, neighbouring samples", PT_SAMPLER_INDEPENDENT, 0, 1, 3, 12);
     neighbours("independent, neighbouring dimensions", PT_SAMPLER_INDEPENDENT, 0, 0, 4, 13);
@@ -569,7 +579,7 @@ static void moments(void)
     pt_check(pt_stats_variance(&s) == 0 && pt_stats_standard_error(&s) == 0 && pt_stats_skewness(&s) == 0,
              "statistics of nothing", "0 where n is too small");
     for (i = 0; i < 5; i++) pt_stats_add(&s, x[i]);
-    pt_check_near("mean", s.mean, 6.2, 1e-15, "see pt_stats_add");
+    pt_check_near("mean", s.mean, 6.2, 1e-15, "mean += (x - mean) / n, with n counted first");
     pt_check_near("variance", pt_stats_variance(&s), 148.8 / 4, 1e-13, "divide by n - 1");
     pt_check_near("standard error", pt_stats_standard_error(&s), sqrt(148.8 / 20), 1e-14,
                   "sqrt(variance / n)");
@@ -633,7 +643,7 @@ static void normal_tail(void)
     }
     near_relative("normal tail at 1", pt_normal_sf(1), 0.15865525393145705, 1e-14);
     near_relative("far normal tail", pt_normal_sf(30), 4.906713927148187e-198, 1e-12);
-    pt_check_near("median", pt_normal_isf(0.5), 0, 1e-14, "see pt_normal_isf");
+    pt_check_near("median", pt_normal_isf(0.5), 0, 1e-14, "half of the normal law lies above its mean, 0");
     near_relative("lower quantile", pt_normal_isf(0.975), -1.959963984540054, 1e-14);
 }
 
@@ -735,7 +745,8 @@ static void one_integral(const integral *f, int kind, uint64_t seed)
         pt_stats_add(&claimed, e.standard_error * e.standard_error);
     }
     sprintf(name, "integral of %s, %s", f->name, kind_names[kind]);
-    pt_check_mean(name, &value, f->exact, 0, 0.02, PT_TEST_MEANS, "see pt_estimate_mean");
+    pt_check_mean(name, &value, f->exact, 0, 0.02, PT_TEST_MEANS,
+                  "the sum must be divided by n; is each dimension of a point drawn from its own stream?");
     sprintf(name, "error of %s, %s", f->name, kind_names[kind]);
     pt_check_equal_means(name, &square, &claimed, 0, "the reported standard error is not the true one");
     if (kinds[kind] != PT_SAMPLER_INDEPENDENT) return;
@@ -746,6 +757,7 @@ static void one_integral(const integral *f, int kind, uint64_t seed)
 
 static void estimates(void)
 {
+    pt_test_source("elementary integrals; the mean of reported squared errors is that of true ones");
     int i, k;
     for (i = 0; i < 6; i++)
         for (k = 0; k < 3; k++) one_integral(&integrals[i], k, (uint64_t)(1000 + 100 * (3 * i + k)));
@@ -903,6 +915,7 @@ static void one_estimator(estimator k, pt_sampler_kind kind, uint64_t seed)
 
 static void other_estimators(void)
 {
+    pt_test_source("elementary integrals");
     int k, s;
     for (k = 0; k < ESTIMATORS; k++)
         for (s = 0; s < 3; s++) one_estimator((estimator)k, kinds[s], (uint64_t)(4000 + 100 * (3 * k + s)));
@@ -937,12 +950,13 @@ static void other_estimators_refuse(void)
 /* Jittered sampling has exact variances: 1/(12 N^3) for x in N strata, 1/(6 N^2) for x + y in N cells. */
 static void jittered_variance(void)
 {
+    pt_test_source("1/(12 N^3) for x in N strata, 1/(6 N^2) for x + y in N cells");
     static const uint32_t counts[3] = {4, 16, 64};
-    const uint32_t sets = pt_test_samples(1u << 14);
+    const uint32_t sets = pt_test_all_samples(1u << 15);
     int c;
     for (c = 0; c < 3; c++) {
         const uint32_t n = counts[c];
-        pt_sampler s = pt_sampler_make(PT_SAMPLER_STRATIFIED, pt_test_seed(50), n);
+        pt_sampler s = pt_sampler_make(PT_SAMPLER_STRATIFIED, pt_test_seed(50 + (uint64_t)c), n);
         pt_stats line = PT_STATS_INIT, square = PT_STATS_INIT;
         uint32_t set, i;
         for (set = 0; set < sets; set++) {
@@ -992,6 +1006,7 @@ static void mis_weights(void)
 
 static void mis_of_powers(void)
 {
+    pt_test_source("Veach and Guibas 1995: integral of sum of (w f)^2 / p, by quadrature");
     static const double row[3][3] = {/* p, variance with balance, with power heuristic */
                                      {1, 0.011110988148968387, 0.013250220050248314},
                                      {2, 0.018721058606716604, 0.018175986775525456},
@@ -1013,9 +1028,11 @@ static void mis_of_powers(void)
                 pt_stats_add(&square, (v - exact) * (v - exact));
             }
             pt_check_mean("combined estimate of x^p", &value, exact, 0, 0.01, PT_TEST_VALUES,
-                          "see pt_mis_weight");
+                          "p^b over the sum of all p^b: weights at a point must sum to 1, and then every b "
+                          "has the same mean");
             pt_check_mean("its variance", &square, row[i][1 + h], 0, 0.03, PT_TEST_VALUES,
-                          "see pt_mis_weight");
+                          "p^b over the sum of all p^b: weights at a point must sum to 1, and then every b "
+                          "has the same mean");
         }
 }
 
@@ -1145,7 +1162,9 @@ static void irradiance_of_polygons(void)
             moved[k] = pt_v3(v[k].z + 8, v[k].x - 4, v[k].y + 2);
         }
         pt_check_near(g->name, pt_irradiance_polygon(1, pt_v3(0, 0, 0), pt_v3(0, 0, 1), v, g->count),
-                      g->exact, tolerance, "see pt_irradiance_polygon");
+                      g->exact, tolerance,
+                      "Lambert's sum over edges of angle times cosine of the edge's plane, over 2 pi; is it "
+                      "clipped at the horizon?");
         pt_check_near(g->name, pt_irradiance_polygon(1, pt_v3(0, 0, 0), pt_v3(0, 0, 1), back, g->count),
                       g->exact, tolerance, "both sides emit");
         pt_check_near(g->name, pt_irradiance_polygon(2, pt_v3(8, -4, 2), pt_v3(1, 0, 0), moved, g->count),
@@ -1223,18 +1242,23 @@ static void colour_matching(void)
     near_relative("sum of ybar", sum, 106.8569, 2e-6);
     y = white[1];
     for (k = 0; k < 3; k++) white[k] /= y;
-    pt_check_near("X of D65", white[0], 0.95047, 1e-5, "see pt_cie_xyz and pt_cie_d65");
-    pt_check_near("Z of D65", white[2], 1.08883, 1e-5, "see pt_cie_xyz and pt_cie_d65");
+    pt_check_near("X of D65", white[0], 0.95047, 1e-5,
+                  "X of the illuminant over its Y: xbar and D65 tables, summed at the same wavelengths");
+    pt_check_near("Z of D65", white[2], 1.08883, 1e-5,
+                  "Z of the illuminant over its Y: zbar and D65 tables, summed at the same wavelengths");
     rgb = pt_xyz_to_rgb(white);
     pt_check(fabs(rgb.r - 1) < 2e-5 && fabs(rgb.g - 1) < 2e-5 && fabs(rgb.b - 1) < 2e-5, "D65 is white",
              "%.7f %.7f %.7f", rgb.r, rgb.g, rgb.b);
     pt_cie_xyz(555, xyz);
-    pt_check_near("ybar has its peak 1 at 555 nm", xyz[1], 1, 1e-12, "see pt_cie_xyz");
-    pt_check_near("D65 at 560 nm", pt_cie_d65(560), 100, 1e-12, "see pt_cie_d65");
+    pt_check_near("ybar has its peak 1 at 555 nm", xyz[1], 1, 1e-12,
+                  "the 1931 observer: ybar(555 nm) = 1; is the table read one entry off?");
+    pt_check_near("D65 at 560 nm", pt_cie_d65(560), 100, 1e-12,
+                  "D65 is normalised to 100 at 560 nm; is the table read one entry off?");
     pt_check_near("D65 halfway between two entries", pt_cie_d65(562.5), 0.5 * (100 + pt_cie_d65(565)), 1e-12,
                   "linear");
     pt_cie_xyz(359.9, xyz);
-    pt_check(xyz[0] == 0 && xyz[1] == 0 && xyz[2] == 0, "nothing is seen below 360 nm", "see pt_cie_xyz");
+    pt_check(xyz[0] == 0 && xyz[1] == 0 && xyz[2] == 0, "nothing is seen below 360 nm",
+             "outside of its table the observer is 0; do not extrapolate");
 }
 
 static void spectra(void)
@@ -1242,7 +1266,8 @@ static void spectra(void)
     static const double nm[3] = {400, 500, 700}, value[3] = {1, 3, 2};
     pt_spectrum s = {nm, value, 3, 0};
     pt_rgbd one;
-    pt_check_near("at a table entry", pt_spectrum_at(&s, 500), 3, 1e-15, "see pt_spectrum_at");
+    pt_check_near("at a table entry", pt_spectrum_at(&s, 500), 3, 1e-15,
+                  "at a wavelength of the table, interpolation must give the entry itself");
     pt_check_near("between two entries", pt_spectrum_at(&s, 650), 2.25, 1e-14, "linear");
     pt_check(pt_spectrum_at(&s, 300) == 1 && pt_spectrum_at(&s, 800) == 2, "outside", "the end values go on");
     pt_check(pt_spectrum_at(&s, 400) == 1 && pt_spectrum_at(&s, 700) == 2, "at the ends", "the end values");
@@ -1609,6 +1634,7 @@ static void bad_paths(void)
 
 static void harness(void)
 {
+    pt_test_source("mean 1/2 of uniform numbers; a fair coin");
     pt_stats s = PT_STATS_INIT, other = PT_STATS_INIT;
     pt_pcg32 rng = pt_pcg32_make(pt_test_seed(90), 9);
     const uint32_t n = pt_test_samples(1u << 16);
@@ -1623,12 +1649,18 @@ static void harness(void)
     fair[0] = fair[1] = 0.5 * n;
     unfair[0] = n * 0.55;
     unfair[1] = n * 0.45;
-    pt_check_mean("mean of u", &s, 0.5, 0, 0.05, PT_TEST_VALUES, "see pt_test.h");
-    pt_check_rejects_mean("mean of u is not 0.54", &s, 0.54, 0, PT_TEST_VALUES, "see pt_test.h");
-    pt_check_mean("0.6 +- 0.1 would do", &s, 0.6, 0.1, 0, PT_TEST_VALUES, "see pt_test.h");
-    pt_check_equal_means("two means of u", &s, &other, 0.05, "see pt_test.h");
-    pt_check_chi2("fair coin", counts, fair, 2, "see pt_test.h");
-    pt_check_rejects_chi2("unfair coin", counts, unfair, 2, "see pt_test.h");
+    pt_check_mean("mean of u", &s, 0.5, 0, 0.05, PT_TEST_VALUES,
+                  "(x - exact) / se of a uniform mean: pt_test_judge_mean");
+    pt_check_rejects_mean("mean of u is not 0.54", &s, 0.54, 0, PT_TEST_VALUES,
+                          "0.04 is dozens of standard errors: the harness must see it");
+    pt_check_mean("0.6 +- 0.1 would do", &s, 0.6, 0.1, 0, PT_TEST_VALUES,
+                  "the error of the exact value must enter the standard error");
+    pt_check_equal_means("two means of u", &s, &other, 0.05,
+                         "variances of the two means add: pt_check_equal_means");
+    pt_check_chi2("fair coin", counts, fair, 2,
+                  "sum of (observed - expected)^2 / expected, cells less one degrees of freedom");
+    pt_check_rejects_chi2("unfair coin", counts, unfair, 2,
+                          "a coin that is not fair must be noticed: pt_test_judge_chi2");
 }
 
 int main(int argc, char **argv)

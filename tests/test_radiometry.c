@@ -11,182 +11,29 @@
      VF-CUBE6 (one radiosity a face) is not in the table: path tracing converges to VF-CUBE1 instead. */
 
 #define PATHTRACER_IMPLEMENTATION
-#include "pt_cases.h"
+#include "pt_means.h"
 
 #include <float.h>
 
 #define ROWS_PATH "tests/data/oracles_radiometry.csv"
-#define ROWS_MAX 256
-#define BOUND 0.005        /* what all checks must be able to see but those that name their own */
-#define RANDOMISATIONS 64u /* of the Sobol points of an estimate; their spread gives the error */
-#define POINTS 1024u       /* in each of them, */
-#define MANY 2048u         /*   where only hits and misses are counted */
-#define RARE 0.01          /* hits rarer than this are not counted */
-#define SIDES 256          /* of the prism that stands for a cylinder, the polygon for a disk */
-#define FAR 1e4            /* half the length of an infinite strip: what it misses is of order 1e-8 */
-#define GRID 40            /* triangles along an edge of the octahedron that becomes a sphere */
+#define POINTS 1024u /* in each randomisation of an estimate, */
+#define MANY 2048u   /*   where only hits and misses are counted */
+#define RARE 0.01    /* hits rarer than this are not counted */
+#define SIDES 256    /* of the prism that stands for a cylinder, the polygon for a disk */
+#define FAR 1e4      /* half the length of an infinite strip: what it misses is of order 1e-8 */
+#define GRID 40      /* triangles along an edge of the octahedron that becomes a sphere */
 
-/* ---------------------------------------------------------------------------------------------------------
-   The exact values */
-
-typedef struct row {
-    char line[256];
-    const char *id, *quantity, *params;
-    double value;
-    int used;
-} row;
-
-static row rows[ROWS_MAX];
-static int row_count;
-
-static int load_rows(void)
-{
-    FILE *const file = fopen(ROWS_PATH, "r");
-    while (file && row_count < ROWS_MAX && fgets(rows[row_count].line, sizeof rows[0].line, file)) {
-        row *const r = &rows[row_count];
-        char *rest = r->line;
-        if (r->line[0] == '#') continue;
-        r->id = pt_case_field(&rest);
-        r->quantity = pt_case_field(&rest);
-        r->params = pt_case_field(&rest);
-        r->value = strtod(pt_case_field(&rest), NULL);
-        row_count++;
-    }
-    if (file) fclose(file);
-    if (row_count == 0)
-        printf("%s cannot read " ROWS_PATH "; run the tests from the root of the repository\n",
-               pt_test_count(0));
-    return row_count > 0;
-}
-
-/* The next row of a table, with that quantity unless it is NULL; NULL at the end. `at` begins at 0. */
-static const row *next_row(const char *table, const char *quantity, int *at)
-{
-    const size_t length = strlen(table);
-    while (*at < row_count) {
-        row *const r = &rows[(*at)++];
-        if (strncmp(r->id, table, length) != 0 || r->id[length] != '-') continue;
-        if (quantity && strcmp(r->quantity, quantity) != 0) continue;
-        r->used = 1;
-        return r;
-    }
-    return NULL;
-}
-
-static double parameter(const row *r, const char *key) { return pt_case_number(r->params, key); }
-static int has(const row *r, const char *key) { return pt_case_find(r->params, key, '=') != NULL; }
-
-/* Numbers of a list like ((-1 -1 1) (1 0 2)), at most max; returns how many. */
-static int numbers(const row *r, const char *key, double *out, int max)
-{
-    const char *at = pt_case_find(r->params, key, '=');
-    int n = 0;
-    while (at && *at && *at != ';' && n < max) {
-        char *end;
-        out[n] = strtod(at, &end);
-        if (end == at) at++;
-        else n++, at = end;
-    }
-    return n;
-}
-
-static void every_row_is_used(void)
-{
-    int i;
-    for (i = 0; i < row_count; i++)
-        pt_check(rows[i].used, "rows in use", "%s %s %s", rows[i].id, rows[i].quantity, rows[i].params);
-}
-
-/* ---------------------------------------------------------------------------------------------------------
-   Small things */
-
-static int is_float(void) { return sizeof(pt_real) == sizeof(float); }
-static pt_real real(double x) { return (pt_real)x; }
-static pt_vec3 v3(double x, double y, double z) { return pt_v3((pt_real)x, (pt_real)y, (pt_real)z); }
-static pt_rgb grey(double x) { return pt_rgb_grey((pt_real)x); }
-static double degrees(double x) { return x * (PT_PI / 180); }
-static double dot(pt_vec3 a, pt_vec3 b)
-{
-    return (double)a.x * (double)b.x + (double)a.y * (double)b.y + (double)a.z * (double)b.z;
-}
-/* How far the numbers of a build may carry a value away: coordinates and random numbers of 24 bits, or of
-   53 and 32. */
-static double rounding(void) { return is_float() ? 1e-6 : 1e-9; }
-
-static const char *row_label(const char *id, const char *what)
-{
-    static char text[96];
-    snprintf(text, sizeof text, "%s %s", id, what);
-    return text;
-}
-
-static void near_relative(const char *name, double got, double exact, double tolerance)
-{
-    pt_check(fabs(got - exact) <= tolerance * fabs(exact), name, "got %.17g, exact %.17g, relative %.3g", got,
-             exact, fabs(got - exact) / fabs(exact));
-}
-
-static void commit(pt_scene *scene)
-{
-    pt_check(pt_commit(scene) == PT_OK, "scene", "%s", pt_scene_error(scene));
-}
-
-static int lamp(pt_scene *scene, double radiance)
-{
-    return pt_add_material(scene, pt_material_emitter(grey(radiance)));
-}
-static int wall(pt_scene *scene, double albedo)
-{
-    return pt_add_material(scene, pt_material_diffuse(grey(albedo)));
-}
-
-/* An estimator draws its numbers in order and returns one value. */
-typedef double (*estimator)(const void *user, pt_sampler *s);
-
-static uint64_t seed_of(const char *name, uint32_t randomisation)
-{
-    uint64_t h = 0;
-    for (; *name; name++) h = pt_hash64(h ^ (unsigned char)*name);
-    return h + pt_test_seed(randomisation);
-}
-
-static pt_stats estimate(const char *name, estimator f, const void *user, uint32_t points)
-{
-    const uint32_t n = pt_test_samples(points);
-    pt_stats s = PT_STATS_INIT;
-    uint32_t r, i;
-    for (r = 0; r < RANDOMISATIONS; r++) {
-        pt_sampler sampler = pt_sampler_make(PT_SAMPLER_SOBOL, seed_of(name, r), 0);
-        double sum = 0;
-        for (i = 0; i < n; i++) {
-            pt_sampler_start(&sampler, 0, i);
-            sum += f(user, &sampler);
-        }
-        pt_stats_add(&s, sum / n);
-    }
-    return s;
-}
-
-/* error: of the exact value, relative, beyond rounding */
-static void check_bound(const char *name, estimator f, const void *user, uint32_t points, double exact,
-                        double error, double bound, const char *hint)
-{
-    const pt_stats s = estimate(name, f, user, points);
-    pt_check_mean(name, &s, exact, (error + rounding()) * fabs(exact), bound, PT_TEST_MEANS, hint);
-}
 static void check(const char *name, estimator f, const void *user, double exact, double error,
                   const char *hint)
 {
     check_bound(name, f, user, POINTS, exact, error, BOUND, hint);
 }
 
-/* Counting hits of which a share p is expected. Points spread well make the error at most 3/4 of what
-   binomial counts have (9 standard errors are seen); left out where hits are rare. */
+/* Hits of which a share p is expected; left out where they are rare. */
 static void check_hits(const char *name, estimator f, const void *user, double exact, double p, double error,
                        const char *hint)
 {
-    const double binomial = sqrt((1 - p) / (p * MANY * RANDOMISATIONS)), bound = 7 * binomial;
-    if (p >= RARE) check_bound(name, f, user, MANY, exact, error, fmax(bound, 2 * BOUND), hint);
+    if (p >= RARE) check_count(name, f, user, MANY, exact, p, error, hint);
 }
 
 /* ---------------------------------------------------------------------------------------------------------
@@ -196,15 +43,6 @@ typedef struct receiver {
     const pt_scene *scene;
     pt_vec3 p, n;
 } receiver;
-
-static pt_ray ray_from(pt_vec3 p, pt_vec3 d)
-{
-    pt_ray ray;
-    ray.o = p;
-    ray.d = d;
-    ray.tmax = real(HUGE_VAL);
-    return ray;
-}
 
 static double seen(const pt_scene *scene, const pt_ray *ray)
 {
@@ -294,6 +132,7 @@ static void check_lamp(const row *r, pt_scene *scene)
 
 static void solid_angles_of_spheres(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: RAD-CAP, RAD-SPH, elementary");
     const row *r;
     int at;
     for (at = 0; (r = next_row("RAD-CAP", NULL, &at)) != NULL;) {
@@ -319,6 +158,7 @@ static double in_cap(const void *user, pt_sampler *s)
 
 static void directions_in_caps(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: RAD-CAP, elementary: 2 pi (1 - cos a)");
     const row *r;
     int at = 0;
     while ((r = next_row("RAD-CAP", NULL, &at)) != NULL) {
@@ -332,12 +172,16 @@ static void directions_in_caps(void)
 static void add_facing(pt_scene *scene, pt_vec3 a, pt_vec3 b, pt_vec3 c, int material)
 {
     const pt_vec3 n = pt_v3_cross(pt_v3_sub(b, a), pt_v3_sub(c, a));
-    if (dot(n, a) < 0) pt_add_triangle(scene, a, b, c, material);
-    else pt_add_triangle(scene, a, c, b, material);
+    if (dot(n, a) < 0)
+        pt_add_triangle(scene, a, b, c, material);
+    else
+        pt_add_triangle(scene, a, c, b, material);
 }
 
 static void solid_angles_of_flat_shapes(void)
 {
+    pt_test_source(
+        "tests/data/oracles_radiometry.csv: RAD-TRI (Van Oosterom and Strackee 1983), RAD-RECT, elementary");
     const pt_vec3 o = v3(0, 0, 0);
     const row *r;
     int at;
@@ -351,8 +195,10 @@ static void solid_angles_of_flat_shapes(void)
             numbers(r, corner[i], n, 3);
             v[i] = hundredfold(n);
         }
-        near_relative(row_label(r->id, "closed"), pt_solid_angle_triangle(o, v[0], v[1], v[2]), r->value, 2e-15);
-        near_relative(row_label(r->id, "turned"), pt_solid_angle_triangle(o, v[2], v[1], v[0]), r->value, 2e-15);
+        near_relative(row_label(r->id, "closed"), pt_solid_angle_triangle(o, v[0], v[1], v[2]), r->value,
+                      2e-15);
+        near_relative(row_label(r->id, "turned"), pt_solid_angle_triangle(o, v[2], v[1], v[0]), r->value,
+                      2e-15);
         near_relative(row_label(r->id, "polygon"), pt_solid_angle_polygon(o, v, 3), r->value, 2e-15);
         add_facing(&scene, v[0], v[1], v[2], lamp(&scene, 1));
         check_lamp(r, &scene);
@@ -410,8 +256,70 @@ static void add_disk(pt_scene *scene, double r, double y, int up, int material)
         pt_add_triangle(scene, v3(0, y, 0), rim(r, y, up ? i + 1 : i), rim(r, y, up ? i : i + 1), material);
 }
 
+/* One value of the irradiance under a disk, in four ways, and its squared difference from the mean. All four
+   have the same mean; what differs is the variance, by which a technique is chosen. */
+enum { BY_HEMISPHERE, BY_COSINE, BY_AREA, BY_CONE };
+
+typedef struct disk_technique {
+    disk d;
+    int how;
+    double mean;
+} disk_technique;
+
+static double one_value_under_disk(const disk_technique *t, pt_sampler *s)
+{
+    const double tangent = t->d.r / t->d.h, half = atan(tangent);
+    const pt_vec2 u = pt_sampler_2d(s);
+    pt_vec3 w;
+    if (t->how == BY_AREA) {
+        const pt_vec2 p = pt_warp_disk(u);
+        const double q = tangent * tangent * ((double)p.x * (double)p.x + (double)p.y * (double)p.y);
+        return tangent * tangent / ((1 + q) * (1 + q)) / (double)pt_warp_disk_pdf_a();
+    }
+    if (t->how == BY_CONE) {
+        const double omc = 2 * sin(half / 2) * sin(half / 2);
+        return (double)pt_warp_cone(u, omc).z / pt_warp_cone_pdf_w(omc);
+    }
+    w = t->how == BY_COSINE ? pt_warp_cosine(u) : pt_warp_hemisphere(u);
+    if ((double)w.z < cos(half)) return 0;
+    return (double)w.z / (double)(t->how == BY_COSINE ? pt_warp_cosine_pdf_w(w) : pt_warp_hemisphere_pdf_w(w));
+}
+static double squared_deviation(const void *user, pt_sampler *s)
+{
+    const disk_technique *const t = (const disk_technique *)user;
+    const double x = one_value_under_disk(t, s) - t->mean;
+    return x * x;
+}
+
+/* Below the centre of a disk of half angle a: E = pi sin^2 a. Second moments: 4 pi^2 (1 - cos^3 a) / 3 by
+   uniform directions, pi^2 sin^2 a by cosine-weighted ones, pi^2 tan^2 a (1 - cos^6 a) / 3 by points uniform in
+   area, 4 pi^2 (1 - cos a) (1 - cos^3 a) / 3 by directions uniform in the cone. */
+static void disk_variances(void)
+{
+    static const char *const names[4] = {"uniform directions", "cosine-weighted", "uniform in area",
+                                         "uniform in the cone"};
+    static const double radius[2] = {1, 3};
+    int i, k;
+    for (i = 0; i < 2; i++) {
+        const double a = atan(radius[i]), c = cos(a), s2 = sin(a) * sin(a), pi2 = PT_PI * PT_PI;
+        const double second[4] = {4 * pi2 * (1 - c * c * c) / 3, pi2 * s2,
+                                  pi2 * radius[i] * radius[i] * (1 - pow(c, 6)) / 3,
+                                  4 * pi2 * (1 - c) * (1 - c * c * c) / 3};
+        for (k = 0; k < 4; k++) {
+            disk_technique t = {{0, 1, 0}, 0, 0};
+            t.d.r = radius[i];
+            t.how = k;
+            t.mean = PT_PI * s2;
+            check_bound(label("variance under a disk of radius %g, %s", radius[i], names[k]),
+                        squared_deviation, &t, 8 * POINTS, second[k] - t.mean * t.mean, 0, 2 * BOUND,
+                        "the density of a warp is not the one that its directions have");
+        }
+    }
+}
+
 static void disks(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: RAD-DISK (Paxton 1959), RAD-EDISK (Howell 2010)");
     const row *r;
     int at;
     for (at = 0; (r = next_row("RAD-DISK", NULL, &at)) != NULL;) {
@@ -435,8 +343,8 @@ static void disks(void)
         below.p.x = real(d.offset);
         below.scene = &scene;
         near_relative(row_label(r->id, "closed"), pt_irradiance_disk(1, d.r, d.h, d.offset), r->value, 3e-15);
-        check_bound(row_label(r->id, "by area"), disk_irradiance, &d, d.h < 0.5 ? 16 * POINTS : POINTS, r->value,
-                    0, BOUND, "cos cos / d^2 over pt_warp_disk");
+        check_bound(row_label(r->id, "by area"), disk_irradiance, &d, d.h < 0.5 ? 16 * POINTS : POINTS,
+                    r->value, 0, BOUND, "cos cos / d^2 over pt_warp_disk");
         add_disk(&scene, d.r, d.h, 0, lamp(&scene, 1));
         commit(&scene);
         check_irradiance(r->id, &below, d.h < 0.5 ? 4 * POINTS : POINTS, r->value, 1e-4);
@@ -494,6 +402,7 @@ static double flux_through_sphere(const void *user, pt_sampler *s)
 
 static void spots(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: RAD-SPOT, smoothstep between the cosines");
     static const double falloff[7] = {0, 0, 5.0 / 32, 0.5, 27.0 / 32, 1, 1};
     const row *r;
     int at = 0, k;
@@ -505,22 +414,24 @@ static void spots(void)
         for (k = -1; k < 6; k++) {
             const double x = 0.25 * k, c = lit.cos_end + x * (lit.cos_start - lit.cos_end);
             pt_check_near(row_label(r->id, "falloff"), pt_spot_falloff(c, lit.cos_start, lit.cos_end),
-                          falloff[k + 1], 1e-13, "see pt_spot_falloff");
+                          falloff[k + 1], 1e-13,
+                          "smooth between the two cosines: t^2 (3 - 2 t), clamped to 0 and 1");
         }
-        near_relative(row_label(r->id, "closed"), pt_flux_spot(intensity, lit.cos_start, lit.cos_end), r->value,
-                      1e-14);
+        near_relative(row_label(r->id, "closed"), pt_flux_spot(intensity, lit.cos_start, lit.cos_end),
+                      r->value, 1e-14);
         pt_add_point_light(&scene, v3(0.5, -0.25, 1), grey(intensity));
         commit(&scene);
         lit.scene = &scene;
         /* 1 - cos of 12 degrees, computed from a cosine, and cosines of single precision in its falloff */
-        check(row_label(r->id, "through a sphere"), flux_through_sphere, &lit, r->value, is_float() ? 1e-5 : 0,
-              "pt_spot_falloff or the point light");
+        check(row_label(r->id, "through a sphere"), flux_through_sphere, &lit, r->value,
+              is_float() ? 1e-5 : 0, "pt_spot_falloff or the point light");
         pt_scene_free(&scene);
     }
 }
 
 static void sphere_lights(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: RAD-ESPH (Snyder 1996)");
     const row *r;
     int at = 0;
     while ((r = next_row("RAD-ESPH", NULL, &at)) != NULL) {
@@ -529,7 +440,8 @@ static void sphere_lights(void)
         pt_scene scene = PT_SCENE_INIT;
         receiver below = {NULL, {0, 0, 0}, {0, 0, 1}};
         /* cos(90 degrees) is 6e-17 here, and E at a small sphere near the horizon has a slope of 1 / cos */
-        near_relative(row_label(r->id, "closed"), pt_irradiance_sphere(1, radius, d, cos(beta)), r->value, 1e-13);
+        near_relative(row_label(r->id, "closed"), pt_irradiance_sphere(1, radius, d, cos(beta)), r->value,
+                      1e-13);
         below.scene = &scene;
         pt_add_sphere(&scene, v3(d * sin(beta), 0, d * cos(beta)), real(radius), lamp(&scene, 1));
         commit(&scene);
@@ -549,8 +461,10 @@ static void check_polygon(const row *r, const double (*v)[3], int count, int as_
     int i;
     if (as_parallelogram) {
         const pt_vec3 e1 = pt_v3_sub(b, a), e2 = pt_v3_sub(v3(v[3][0], v[3][1], v[3][2]), a);
-        if (dot(pt_v3_cross(e1, e2), a) < 0) pt_add_parallelogram(&scene, a, e1, e2, material);
-        else pt_add_parallelogram(&scene, a, e2, e1, material);
+        if (dot(pt_v3_cross(e1, e2), a) < 0)
+            pt_add_parallelogram(&scene, a, e1, e2, material);
+        else
+            pt_add_parallelogram(&scene, a, e2, e1, material);
     }
     for (i = 1; i + 1 < count && !as_parallelogram; i++)
         add_facing(&scene, a, v3(v[i][0], v[i][1], v[i][2]), v3(v[i + 1][0], v[i + 1][1], v[i + 1][2]),
@@ -564,6 +478,7 @@ static void check_polygon(const row *r, const double (*v)[3], int count, int as_
 
 static void polygon_lights(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: RAD-EPOLY (Lambert 1760)");
     const row *r;
     int at = 0;
     while ((r = next_row("RAD-EPOLY", NULL, &at)) != NULL) {
@@ -582,6 +497,7 @@ static void polygon_lights(void)
 
 static void regular_polygons(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: RAD-NGON (Lambert 1760)");
     const row *r;
     int at = 0;
     while ((r = next_row("RAD-NGON", NULL, &at)) != NULL) {
@@ -603,8 +519,8 @@ static void regular_polygons(void)
         }
         near_relative(row_label(r->id, "triangles"), sum, r->value, tolerance);
         if (n <= 32)
-            near_relative(row_label(r->id, "closed"), pt_irradiance_polygon(1, v3(0, 0, 0), v3(0, 0, 1), v, n),
-                          r->value, tolerance);
+            near_relative(row_label(r->id, "closed"),
+                          pt_irradiance_polygon(1, v3(0, 0, 0), v3(0, 0, 1), v, n), r->value, tolerance);
         commit(&scene);
         below.scene = &scene;
         check_irradiance(r->id, &below, POINTS, r->value, 0);
@@ -634,6 +550,7 @@ static double sky_deviation(const void *user, pt_sampler *s)
 
 static void skies(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: RAD-SKY, elementary");
     const row *r;
     int at = 0;
     double mean = 0; /* its row stands before those of the variances */
@@ -669,6 +586,7 @@ static void skies(void)
    instead, which adds up to pi. The floor ends a millionth below the true horizon. */
 static void tilted_planes(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: RAD-TILT, elementary: pi (1 + cos t)/2");
     const double size = 1e6;
     const row *r;
     int at = 0;
@@ -703,7 +621,8 @@ static void bulb(const row *r, double intensity)
     const double radius = 0.03, flux = parameter(r, "Phi_lm"), d = 2;
     pt_scene scene = PT_SCENE_INIT;
     receiver below = {NULL, {0, 0, 0}, {0, 1, 0}};
-    near_relative(row_label(r->id, "closed"), pt_exitance(r->value) * 4 * PT_PI * radius * radius, flux, 1e-15);
+    near_relative(row_label(r->id, "closed"), pt_exitance(r->value) * 4 * PT_PI * radius * radius, flux,
+                  1e-15);
     near_relative(row_label(r->id, "illuminance"), pt_irradiance_sphere(r->value, radius, d, 1),
                   pt_irradiance_point(intensity, d, 1), 1e-14);
     pt_add_sphere(&scene, v3(0, d, 0), real(radius), lamp(&scene, r->value));
@@ -716,6 +635,7 @@ static void bulb(const row *r, double intensity)
 
 static void photometry(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: RAD-PHOT, definition of the candela in the SI");
     /* 540 THz is 555.017 nm, where V is below its greatest value by less than 1e-5 */
     const double nm = 299792458e9 / 540e12;
     double bar[3], intensity = 0; /* its row stands before that of the bulb */
@@ -723,7 +643,7 @@ static void photometry(void)
     int at = 0;
     pt_cie_xyz(nm, bar);
     pt_check_near("683 lm/W at 540 THz", PT_LUMENS_PER_WATT * bar[1], 683, 683 * 1e-5,
-                  "see PT_LUMENS_PER_WATT");
+                  "lm/W at 555 nm; a weight by ybar must follow");
     while ((r = next_row("RAD-PHOT", NULL, &at)) != NULL) {
         const double flux = parameter(r, "Phi_lm");
         if (strcmp(r->quantity, "I_cd") == 0) {
@@ -772,8 +692,10 @@ static double peak(double kelvin)
     int i;
     for (i = 0; i < 60; i++) {
         const double x = b - golden * (b - a), y = a + golden * (b - a);
-        if (pt_blackbody(x, kelvin) < pt_blackbody(y, kelvin)) a = x;
-        else b = y;
+        if (pt_blackbody(x, kelvin) < pt_blackbody(y, kelvin))
+            a = x;
+        else
+            b = y;
     }
     return 0.5 * (a + b);
 }
@@ -787,6 +709,7 @@ static double one_wavelength(const void *user, pt_sampler *s)
 
 static void black_bodies(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: RAD-BB, Planck's law, CODATA 2019");
     double exitance = 0;
     const row *r;
     int at = 0;
@@ -805,8 +728,9 @@ static void black_bodies(void)
             near_relative(r->id, pt_blackbody(peak(t), t) * 1e9, r->value, 2e-14);
         } else {
             near_relative(r->id, integrated_band(t, 360, 830) / exitance, r->value, 1e-12);
-            check(row_label(r->id, "by wavelengths"), one_wavelength, &t, r->value * exitance, 0,
-                  "see pt_blackbody");
+            check(
+                row_label(r->id, "by wavelengths"), one_wavelength, &t, r->value * exitance, 0,
+                "Planck: 2 h c^2 / lambda^5 / (exp(h c / (lambda k T)) - 1), times 1e-9 to be per nanometre");
         }
     }
 }
@@ -823,8 +747,8 @@ static void luminous_efficacy(void)
             pt_cie_xyz(360 + 0.01 * i, bar);
             sum += bar[1] * pt_blackbody(360 + 0.01 * i, t) * 0.01;
         }
-        near_relative(row_label(r->id, "efficacy"), pt_blackbody_efficacy(t), 683.002 * PT_PI * sum / r->value,
-                      1e-4);
+        near_relative(row_label(r->id, "efficacy"), pt_blackbody_efficacy(t),
+                      683.002 * PT_PI * sum / r->value, 1e-4);
     }
     pt_check_near("a light bulb of 2700 K", pt_blackbody_efficacy(2700), 12.4, 0.1, "lm/W");
 }
@@ -844,14 +768,14 @@ static void colours(void)
         xyz[axis] = r->value;
         if (axis == 1)
             pt_check_near(row_label(r->id, "luminance"), pt_luminance(band == 'R', band == 'G', band == 'B'),
-                          r->value, unit * r->value, "see pt_luminance");
+                          r->value, unit * r->value, "0.2126, 0.7152, 0.0722 of linear sRGB: no gamma");
         if (axis == 2) {
             const pt_rgbd c = pt_xyz_to_rgb(xyz);
             const double got[3] = {c.r, c.g, c.b};
             int k;
             for (k = 0; k < 3; k++)
                 pt_check_near(row_label(r->id, "to linear sRGB"), got[k], bands[k] == band, 2 * unit,
-                              "see pt_xyz_to_rgb");
+                              "the matrix of sRGB with white D65, rows not columns");
         }
     }
     for (at = 0; (r = next_row("RAD-SRGBTF", "encoded", &at)) != NULL;)
@@ -912,20 +836,20 @@ static patch on_floor(double x0, double x1, double z0, double z1)
 
 static void rectangles(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: VF-PAR, VF-PERP (Howell 2010)");
     const row *r;
     int at;
     near_relative("squares far apart", 1e12 * PT_PI * pt_form_factor_parallel(1, 1, 1e6), 1, 1e-11);
     for (at = 0; (r = next_row("VF-PAR", "F12", &at)) != NULL;) {
         const double a = parameter(r, "a"), b = parameter(r, "b"), c = parameter(r, "c");
-        near_relative(row_label(r->id, "closed"), pt_form_factor_parallel(a, b, c), r->value,
-                      2e-14);
+        near_relative(row_label(r->id, "closed"), pt_form_factor_parallel(a, b, c), r->value, 2e-14);
         check_form_factor(r, on_floor(0, a, 0, b), v3(0, c, 0), v3(a, 0, 0), v3(0, 0, b));
     }
     for (at = 0; (r = next_row("VF-PERP", "F12", &at)) != NULL;) {
         const double w = parameter(r, "w"), h = parameter(r, "h"), l = parameter(r, "l");
         near_relative(row_label(r->id, "closed"), pt_form_factor_perpendicular(w, h, l), r->value, 2e-14);
-        near_relative(row_label(r->id, "reciprocity"), pt_form_factor_perpendicular(h, w, l) * h / w, r->value,
-                      2e-14);
+        near_relative(row_label(r->id, "reciprocity"), pt_form_factor_perpendicular(h, w, l) * h / w,
+                      r->value, 2e-14);
         check_form_factor(r, on_floor(0, w, 0, l), v3(0, 0, 0), v3(0, h, 0), v3(0, 0, l));
     }
 }
@@ -945,6 +869,7 @@ static double parallel_in_general(const double a[4], const double b[4], double c
 
 static void rectangles_in_general_position(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: VF-PAROFF (Howell 2010)");
     const row *r;
     int at = 0;
     while ((r = next_row("VF-PAROFF", "F12", &at)) != NULL) {
@@ -960,6 +885,7 @@ static void rectangles_in_general_position(void)
 
 static void strips(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: VF-STRIP, VF-WEDGE (Hottel's crossed strings)");
     const row *r;
     int at;
     for (at = 0; (r = next_row("VF-STRIP", "F12", &at)) != NULL;) {
@@ -1010,6 +936,7 @@ static double mean_irradiance(const void *user, pt_sampler *s)
 
 static void coaxial_disks(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: VF-DISK (Howell 2010)");
     const row *r;
     int at = 0;
     while ((r = next_row("VF-DISK", "F12", &at)) != NULL) {
@@ -1019,7 +946,8 @@ static void coaxial_disks(void)
         from.r = parameter(r, "r1");
         from.r2 = parameter(r, "r2");
         from.h = parameter(r, "h");
-        near_relative(row_label(r->id, "closed"), pt_form_factor_disks(from.r, from.r2, from.h), r->value, 2e-15);
+        near_relative(row_label(r->id, "closed"), pt_form_factor_disks(from.r, from.r2, from.h), r->value,
+                      2e-15);
         check(row_label(r->id, "irradiance"), mean_irradiance, &from, r->value, 0,
               "the mean of pt_irradiance_disk");
         add_disk(&scene, from.r2, from.h, 0, lamp(&scene, 1));
@@ -1049,14 +977,15 @@ static double flux_onto_disk(const void *user, pt_sampler *s)
 
 static void sphere_and_disk(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: VF-SPHDISK (Howell 2010)");
     const row *r;
     int at = 0;
     while ((r = next_row("VF-SPHDISK", "F_sd", &at)) != NULL) {
         const double radius = parameter(r, "r"), h = parameter(r, "h");
         pt_scene scene = PT_SCENE_INIT;
         near_relative(row_label(r->id, "closed"), pt_form_factor_sphere_disk(radius, h), r->value, 1e-15);
-        near_relative(row_label(r->id, "solid angle"), pt_solid_angle_disk(radius, h, 0) / (4 * PT_PI), r->value,
-                      1e-15);
+        near_relative(row_label(r->id, "solid angle"), pt_solid_angle_disk(radius, h, 0) / (4 * PT_PI),
+                      r->value, 1e-15);
         pt_add_sphere(&scene, v3(0, 0, 0), real(0.5 * h), lamp(&scene, 2));
         add_disk(&scene, radius, h, 0, wall(&scene, 0));
         commit(&scene);
@@ -1064,19 +993,6 @@ static void sphere_and_disk(void)
                     14 * BOUND, "rays of pt_light_sample_le");
         pt_scene_free(&scene);
     }
-}
-
-/* A ray from a point whose coordinates were rounded, the magnitude of which is at most 2. */
-static pt_ray leave(pt_vec3 p, pt_vec3 n, pt_vec3 w)
-{
-    const pt_real e = real(4 * pt_gamma(3));
-    return pt_spawn_ray(p, pt_v3(e, e, e), n, w);
-}
-
-static pt_vec3 cosine_around(pt_vec3 n, pt_sampler *s)
-{
-    const pt_frame frame = pt_frame_from_normal(n);
-    return pt_frame_to_world(&frame, pt_warp_cosine(pt_sampler_2d(s)));
 }
 
 /* From the outer of two spheres inwards: does the ray meet the inner one? One that meets none escaped. */
@@ -1103,6 +1019,7 @@ static double onto_inner_cylinder(const void *user, pt_sampler *s)
 
 static void concentric(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: VF-CONC, reciprocity");
     const row *r;
     int at = 0;
     while ((r = next_row("VF-CONC", NULL, &at)) != NULL) {
@@ -1167,6 +1084,7 @@ static double side_to_side(const void *user, pt_sampler *s)
 
 static void closed_cylinders(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: VF-CYL (Howell 2010)");
     const row *r;
     int at = 0;
     while ((r = next_row("VF-CYL", NULL, &at)) != NULL) {
@@ -1180,8 +1098,8 @@ static void closed_cylinders(void)
         near_relative(row_label(r->id, "closed"), sideways ? 1 - c.r / c.h * (1 - across) : across, r->value,
                       1e-14);
         make_cylinder(&c);
-        check_hits(row_label(r->id, "rays"), sideways ? side_to_side : base_to_top, &c, r->value, r->value, 1e-4,
-                   "rays within a closed cylinder");
+        check_hits(row_label(r->id, "rays"), sideways ? side_to_side : base_to_top, &c, r->value, r->value,
+                   1e-4, "rays within a closed cylinder");
         pt_scene_free(&c.scene);
     }
 }
@@ -1219,6 +1137,8 @@ static double bowl_to_itself(const void *user, pt_sampler *s)
 
 static void bowls(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: VF-SPHCAV, the kernel of a sphere is constant "
+                   "(Jacquez and Kuppenheim 1955)");
     const row *r;
     int at = 0;
     while ((r = next_row("VF-SPHCAV", "F_self", &at)) != NULL) {
@@ -1292,6 +1212,7 @@ static int face_of(const char *quantity)
 
 static void cube_by_reflections(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: VF-CUBE1, quadrature of products of form factors");
     const double fo = pt_form_factor_parallel(1, 1, 1), fa = pt_form_factor_perpendicular(1, 1, 1);
     const row *r;
     int at = 0;
@@ -1375,6 +1296,7 @@ static double wall_radiance(const void *user, pt_sampler *s)
 
 static void integrating_spheres(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: VF-ISPH (Jacquez and Kuppenheim 1955)");
     const row *r;
     int at = 0;
     while ((r = next_row("VF-ISPH", NULL, &at)) != NULL) {
@@ -1413,6 +1335,7 @@ static double lit_wall(const void *user, pt_sampler *s)
 
 static void spheres_around_point_lights(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: VF-ISPHPT (Jacquez and Kuppenheim 1955)");
     const row *r;
     int at = 0;
     while ((r = next_row("VF-ISPHPT", "L", &at)) != NULL) {
@@ -1448,6 +1371,7 @@ static double between_spheres(const void *user, pt_sampler *s)
 
 static void concentric_spheres_that_shine(void)
 {
+    pt_test_source("tests/data/oracles_radiometry.csv: VF-CSPH, reciprocity and symmetry");
     static const char *const keys[2][3] = {{"r1", "rho1", "Le1"}, {"r2", "rho2", "Le2"}};
     const row *r;
     int at = 0, k;
@@ -1476,11 +1400,12 @@ static void concentric_spheres_that_shine(void)
 int main(int argc, char **argv)
 {
     pt_test_begin("test_radiometry", argc, argv);
-    if (!load_rows()) return pt_test_end();
+    if (!load_rows(ROWS_PATH)) return pt_test_end();
     PT_TEST(solid_angles_of_spheres);
     PT_TEST(directions_in_caps);
     PT_TEST(solid_angles_of_flat_shapes);
     PT_TEST(disks);
+    PT_TEST(disk_variances);
     PT_TEST_EXACT(point_lights);
     PT_TEST(spots);
     PT_TEST(sphere_lights);

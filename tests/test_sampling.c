@@ -129,6 +129,7 @@ static int warp_cell(warp k, pt_vec3 w)
 
 static void warps(void)
 {
+    pt_test_source("closed form: areas of the cells under the density of the warp");
     const uint32_t n = pt_test_samples(1u << 17);
     int k;
     for (k = 0; k < WARPS; k++) {
@@ -147,7 +148,9 @@ static void warps(void)
         if (k == IN_BALL || k == POLAR)
             pt_check_rejects_chi2(warp_names[k], counts, expected, 256, "this density is not the right one");
         else
-            pt_check_chi2(warp_names[k], counts, expected, 256, "see [PT-04]");
+            pt_check_chi2(warp_names[k], counts, expected, 256,
+                          "do equal areas of u map to equal probabilities? sqrt of u for disks and cosine, z "
+                          "linear in u for spheres");
     }
 }
 
@@ -160,8 +163,9 @@ static double one_minus_cos(pt_vec3 w)
 
 static void cones(void)
 {
+    pt_test_source("closed form: 1 - cos is uniform, and so is the azimuth");
     static const double omc[8] = {1e-20, 1e-12, 1e-6, 0.01, 0.5, 1, 1.7, 2};
-    const uint32_t n = pt_test_samples(1u << 16);
+    const uint32_t n = pt_test_all_samples(1u << 16);
     int c, i;
     for (c = 0; c < 8; c++) {
         pt_pcg32 rng = generator((uint64_t)(20 + c));
@@ -172,7 +176,9 @@ static void cones(void)
             counts[cell(one_minus_cos(w) / omc[c], 16) * 16 + cell(turn(dbl(w.y), dbl(w.x)), 16)]++;
         }
         pt_check(longest <= unit_slack(), "cone", "directions are not of unit length: off by %g", longest);
-        expect_uniform("cone", counts, 256, "see pt_warp_cone: 1 - cos must be uniform");
+        expect_uniform(
+            "cone", counts, 256,
+            "1 - cos of the angle must be uniform up to 1 - cos of the cone, not the angle itself");
         pt_check_near("density of a cone", pt_warp_cone_pdf_w(omc[c]) * 2 * PT_PI * omc[c], 1, 1e-15,
                       "one over its solid angle");
     }
@@ -204,6 +210,7 @@ static void corners_of_the_square(void)
 /* Densities integrate to 1, and 1/density over samples to the solid angle of the support. */
 static void densities(void)
 {
+    pt_test_source("densities integrate to 1; irradiance pi under a uniform sky");
     const uint32_t n = pt_test_samples(1u << 17);
     pt_stats hemisphere = PT_STATS_INIT, cosine = PT_STATS_INIT, hit_and_miss = PT_STATS_INIT;
     pt_pcg32 rng = generator(30);
@@ -271,6 +278,7 @@ static const seen_triangle seen[7] = {
 
 static void spherical_triangles(void)
 {
+    pt_test_source("solid angles of sub-triangles (Van Oosterom and Strackee 1983)");
     const uint32_t n = pt_test_samples(1u << 16);
     int t, i, j, k;
     for (t = 0; t < 7; t++) {
@@ -297,7 +305,9 @@ static void spherical_triangles(void)
             }
         pt_check(longest <= unit_slack(), seen[t].name, "directions are not of unit length: off by %g",
                  longest);
-        pt_check_chi2(seen[t].name, counts, expected, 128, "see pt_spherical_triangle_sample");
+        pt_check_chi2(
+            seen[t].name, counts, expected, 128,
+            "equal parts of u must be equal solid angles (Arvo): areas by Girard, then along the arc");
     }
 }
 
@@ -313,17 +323,18 @@ static double rectangle(double x0, double x1, double y0, double y1, double h)
 
 static void spherical_rectangles(void)
 {
-    static const double r[7][5] = {
-        /* x0, x1, y0, y1, h */
+    pt_test_source("solid angles of parts of a rectangle (Urena et al. 2013)");
+    static const double r[9][5] = {
+        /* x0, x1, y0, y1, h; the last two are sampled as two triangles */
         {-0.5, 0.5, -0.5, 0.5, 0.5},   {-16, 16, -8, 8, 0.25}, {1, 3, 2, 2.5, 0.125},
         {-4, 4, 1, 1.03125, 1},        {0, 1, 0, 1, 1},        {20, 20.125, 30, 30.125, 40},
-        {0, 0.015625, 0, 0.015625, 64}};
-    static const char *const names[7] = {"cube face", "nearly a hemisphere", "aside and grazing",
+        {0, 0.015625, 0, 0.015625, 64}, {0, 0.00390625, 0, 0.001953125, 64}, {1, 3, -1, 1, 0x1p-32}};
+    static const char *const names[9] = {"cube face", "nearly a hemisphere", "aside and grazing",
                                          "strip",     "above its corner",    "small and aslant",
-                                         "tiny"};
+                                         "tiny",      "tinier",              "nearly edge-on"};
     const uint32_t n = pt_test_samples(1u << 16);
     int t, i, j;
-    for (t = 0; t < 7; t++) {
+    for (t = 0; t < 9; t++) {
         const double x0 = r[t][0], y0 = r[t][2], h = r[t][4], dx = (r[t][1] - x0) / 8,
                      dy = (r[t][3] - y0) / 8;
         const double whole = rectangle(x0, r[t][1], y0, r[t][3], h);
@@ -341,8 +352,10 @@ static void spherical_rectangles(void)
             for (j = 0; j < 8; j++)
                 expected[8 * i + j] =
                     n * rectangle(x0 + i * dx, x0 + (i + 1) * dx, y0 + j * dy, y0 + (j + 1) * dy, h) / whole;
-        pt_check_near(names[t], made / whole, 1, 1e-9, "solid angle of a rectangle");
-        pt_check_chi2(names[t], counts, expected, 64, "see pt_spherical_rectangle_sample");
+        pt_check_near(names[t], made / whole, 1, t == 8 ? 2e-6 : 1e-9 /* the sum of arcs cancels there */,
+                      "solid angle of a rectangle");
+        pt_check_chi2(names[t], counts, expected, 64,
+                      "equal parts of u must be equal solid angles (Urena et al.)");
     }
 }
 
@@ -368,12 +381,16 @@ static void one_alias(const char *name, const double *weights, uint32_t count, u
     }
     pt_check(wrong == 0, name, "%d of %u draws have a wrong or zero probability", wrong, n);
     pt_check_near(name, all, 1, 1e-14, "probabilities must add up to 1");
-    if (count > 1) pt_check_chi2(name, counts, expected, (int)count, "see pti_alias_fill");
+    if (count > 1)
+        pt_check_chi2(
+            name, counts, expected, (int)count,
+            "column i keeps i with its share, else gives its alias: expected counts are n w / sum w");
     pt_alias_free(&table, NULL);
 }
 
 static void alias_tables(void)
 {
+    pt_test_source("expected counts n w / sum of w");
     static const double one[1] = {3}, two[2] = {1, 3}, holes[6] = {0, 1, 0, 4, 2, 0},
                         wide[3] = {1e30, 1e-30, 1e30}, bad[2] = {1, -1}, nothing[3] = {0, 0, 0};
     double many[64], infinite[2] = {1, HUGE_VAL};
@@ -456,6 +473,7 @@ static void one_story(const char *name, const pt_bsdf *b, pt_vec3 wo, pt_transpo
 
 static void diffuse(void)
 {
+    pt_test_source("the mean weight of samples is the integral of f cos: the albedo");
     const pt_material m = pt_material_diffuse(pt_rgb3(real(0.8), real(0.5), real(0.1)));
     const pt_vec3 n = pt_v3_normalize(pt_v3(1, -2, 2)), tilted = pt_v3_normalize(pt_v3(1, -2, 3));
     const pt_hit flat = hit_of(n, n), smooth = hit_of(n, tilted);
@@ -480,32 +498,41 @@ static void diffuse(void)
     one_story("the same from below", &t, below, PT_RADIANCE, 75, -dbl(m.albedo.r));
 }
 
-/* Sampled directions against pdf cos/pi, with a normal that is no axis. */
+/* Sampled directions against pdf cos/pi, with a normal that is no axis: from above and below, along the normal
+   and at 89 degrees, for radiance and for importance. */
+static void directions_from(const pt_bsdf *b, pt_vec3 wo, int side, pt_transport mode, uint64_t seed)
+{
+    pt_test_source("closed form: cos / pi");
+    const uint32_t n = pt_test_samples(1u << 17);
+    pt_pcg32 rng = generator(seed);
+    double counts[256] = {0};
+    uint32_t i, outside = 0;
+    for (i = 0; i < n; i++) {
+        pt_bsdf_sample_result s;
+        pt_vec3 l;
+        const pt_vec2 u = pair(&rng);
+        const int got = pt_bsdf_sample(b, wo, pt_pcg32_double(&rng), u, mode, &s);
+        l = pt_frame_to_local(&b->frame, s.wi);
+        outside += !got || dbl(l.z) * side <= 0 || s.lobe != PT_LOBE_DIFFUSE || dbl(s.eta) != 1;
+        counts[cell(dbl(l.z) * dbl(l.z), 16) * 16 + cell(turn(dbl(l.y), dbl(l.x)), 16)]++;
+    }
+    pt_check(outside == 0, "diffuse directions", "%u of %u go through the surface, or were not sampled",
+             outside, n);
+    expect_uniform("diffuse directions", counts, 256, "not cosine weighted");
+}
+
 static void diffuse_directions(void)
 {
-    const uint32_t n = pt_test_samples(1u << 17);
     const pt_material m = pt_material_diffuse(pt_rgb_grey(1));
     const pt_vec3 normal = pt_v3_normalize(pt_v3(-3, 1, real(0.5)));
     const pt_hit hit = hit_of(normal, normal);
     const pt_bsdf b = pt_bsdf_make(&m, &hit);
-    int side;
-    for (side = 1; side >= -1; side -= 2) {
-        pt_pcg32 rng = generator((uint64_t)(78 + side));
-        double counts[256] = {0};
-        int i, outside = 0;
-        for (i = 0; i < (int)n; i++) {
-            pt_bsdf_sample_result s;
-            pt_vec3 l;
-            const pt_vec2 u = pair(&rng);
-            const int got = pt_bsdf_sample(&b, pt_v3_scale(normal, real(side)), pt_pcg32_double(&rng), u,
-                                           PT_RADIANCE, &s);
-            l = pt_frame_to_local(&b.frame, s.wi);
-            outside += !got || dbl(l.z) * side <= 0 || s.lobe != PT_LOBE_DIFFUSE || dbl(s.eta) != 1;
-            counts[cell(dbl(l.z) * dbl(l.z), 16) * 16 + cell(turn(dbl(l.y), dbl(l.x)), 16)]++;
-        }
-        pt_check(outside == 0, "diffuse directions", "%d of %u go through the surface, or were not sampled",
-                 outside, n);
-        expect_uniform("diffuse directions", counts, 256, "not cosine weighted");
+    int k;
+    for (k = 0; k < 8; k++) {
+        const int side = k & 1 ? 1 : -1;
+        const double t = k & 2 ? 89 * PT_PI / 180 : 0;
+        const pt_vec3 wo = pt_frame_to_world(&b.frame, v3(0.6 * sin(t), 0.8 * sin(t), side * cos(t)));
+        directions_from(&b, wo, side, k & 4 ? PT_IMPORTANCE : PT_RADIANCE, (uint64_t)(700 + k));
     }
 }
 
@@ -536,6 +563,60 @@ static void black_and_mirror(void)
                      dbl(pt_bsdf_pdf_w(&b, o, s.wi, PT_RADIANCE)) == 0,
                  "mirror", "eval and pdf of a delta are 0");
     }
+}
+
+/* A direction in the plane of the surface itself is on neither side: nothing is reflected to it or from it. */
+static void edge_on(void)
+{
+    const pt_material mirror = pt_material_mirror(pt_rgb_grey(1)), white = pt_material_diffuse(pt_rgb_grey(1)),
+                      air = pt_material_dielectric(1);
+    const pt_vec3 up = pt_v3(0, 0, 1), along = pt_v3(1, 0, 0), leaning = pt_v3_normalize(pt_v3(1, 0, 2));
+    const pt_hit flat = hit_of(up, up), bent = hit_of(up, leaning);
+    pt_bsdf b = pt_bsdf_make(&mirror, &flat);
+    pt_bsdf_sample_result s;
+    pt_check(!pt_bsdf_sample(&b, along, 0.5, pt_v2(0, 0), PT_RADIANCE, &s), "a mirror seen edge-on", "reflects");
+    b = pt_bsdf_make(&white, &bent);
+    pt_check(dbl(pt_bsdf_pdf_w(&b, up, leaning, PT_RADIANCE)) > 0 &&
+                 dbl(pt_bsdf_eval(&b, up, along, PT_RADIANCE, PT_LOBE_ALL).r) == 0 &&
+                 dbl(pt_bsdf_pdf_w(&b, up, along, PT_RADIANCE)) == 0,
+             "a light in the plane of a surface", "lights it, as the shading normal leans to it");
+    b = pt_bsdf_make(&air, &flat);
+    pt_check(pt_bsdf_sample(&b, up, 0, pt_v2(0, 0), PT_RADIANCE, &s) && dbl(s.wi.z) < 0 && dbl(s.pdf_w) == 1,
+             "ior 1", "reflects, for u_lobe 0, with probability 0");
+}
+
+/* From points that rounding has put just before the plane of a light a sampled direction may round to one that
+   leads away from it: then there is no sample, and never one at a negative distance. */
+static void lights_edge_on(void)
+{
+    pt_pcg32 rng = generator(84);
+    int k, i, wrong = 0, sampled = 0;
+    for (k = 0; k < 64; k++) {
+        pt_scene scene = PT_SCENE_INIT;
+        const int lamp = pt_add_material(&scene, pt_material_emitter(pt_rgb_grey(1)));
+        pt_vec3 v[3];
+        for (i = 0; i < 3; i++) {
+            const double size = i == 0 ? 100 : 1;
+            v[i].x = real(size * (2 * pt_pcg32_double(&rng) - 1));
+            v[i].y = real(size * (2 * pt_pcg32_double(&rng) - 1));
+            v[i].z = real(size * (2 * pt_pcg32_double(&rng) - 1));
+        }
+        if (k & 1) pt_add_parallelogram(&scene, v[0], v[1], v[2], lamp);
+        else pt_add_triangle(&scene, v[0], pt_v3_add(v[0], v[1]), pt_v3_add(v[0], v[2]), lamp);
+        if (pt_commit(&scene) != PT_OK) wrong++;
+        for (i = 0; i < 8192; i++) {
+            const pt_vec2 at = pair(&rng), ends[2] = {{0, 0}, {real(1 - 0x1p-24), real(1 - 0x1p-24)}};
+            const pt_vec3 p = pt_v3_add(v[0], pt_v3_add(pt_v3_scale(v[1], 40 * at.x - 20), pt_v3_scale(v[2], 40 * at.y - 20)));
+            pt_light_sample_result s;
+            memset(&s, 0, sizeof s);
+            if (!pt_light_sample(&scene, 0, p, i % 3 < 2 ? ends[i % 3] : pair(&rng), &s)) continue;
+            sampled++;
+            wrong += !(s.distance > 0) || !(s.pdf_w > 0); /* in double, at 1e-14 of it, s.wi is off by 5 % */
+            wrong += sizeof(pt_real) == sizeof(float) && !(fabs(length3(s.wi) - 1) < 1e-5);
+        }
+        pt_scene_free(&scene);
+    }
+    pt_check(wrong == 0 && sampled > 10000, "lights seen edge-on", "%d of %d samples are wrong", wrong, sampled);
 }
 
 static void fresnel_rows(void)
@@ -571,6 +652,7 @@ static double fresnel_integrand(const double *u, void *eta)
 /* Values for 1.5 by quadrature; from inside by 1 - F = (1 - F outside) / n^2. */
 static void fresnel_of_diffuse_light(void)
 {
+    pt_test_source("Fresnel's equations, by quadrature; inside: 1 - (1 - F)/n^2");
     static const double exact[2] = {0.091777959, 0.596345760};
     int inside, i;
     for (inside = 0; inside < 2; inside++) {
@@ -578,13 +660,18 @@ static void fresnel_of_diffuse_light(void)
         pt_stats s = PT_STATS_INIT;
         for (i = 0; i < 64; i++) {
             pt_estimate e;
-            const pt_integral p = {fresnel_integrand, &eta, 1, pt_test_samples(4096), PT_SAMPLER_STRATIFIED,
+            const pt_integral p = {fresnel_integrand,
+                                   &eta,
+                                   1,
+                                   pt_test_samples(4096),
+                                   PT_SAMPLER_STRATIFIED,
                                    pt_test_seed((uint64_t)(200 + i))};
             pt_estimate_mean(&p, &e);
             pt_stats_add(&s, e.value);
         }
         pt_check_mean("reflectance for diffuse light", &s, exact[inside], 5e-10, 0.005, PT_TEST_MEANS,
-                      "see pt_fresnel_dielectric");
+                      "mean of both polarisations, weighted with 2 cos over the hemisphere; 1 beyond the "
+                      "critical angle");
     }
 }
 
@@ -652,11 +739,10 @@ static void glass(void)
         const pt_hit hit = hit_of(n, n);
         const pt_bsdf b = pt_bsdf_make(&zero, &hit);
         pt_bsdf_sample_result s;
-        pt_check(pt_bsdf_sample(&b, n, 0.9, pt_v2(0, 0), PT_RADIANCE, &s) &&
-                     fabs(dbl(s.eta) - 1.5) < 1e-6,
+        pt_check(pt_bsdf_sample(&b, n, 0.9, pt_v2(0, 0), PT_RADIANCE, &s) && fabs(dbl(s.eta) - 1.5) < 1e-6,
                  "glass", "ior 0 stands for 1.5");
-        pt_check(pt_bsdf_sample(&b, n, 0.0399, pt_v2(0, 0), PT_RADIANCE, &s) && dbl(s.eta) == 1,
-                 "glass", "4 %% reflected at 1.5");
+        pt_check(pt_bsdf_sample(&b, n, 0.0399, pt_v2(0, 0), PT_RADIANCE, &s) && dbl(s.eta) == 1, "glass",
+                 "4 %% reflected at 1.5");
         pt_check(dbl(pt_bsdf_eval(&b, n, s.wi, PT_RADIANCE, PT_LOBE_ALL).r) == 0 &&
                      dbl(pt_bsdf_pdf_w(&b, n, s.wi, PT_RADIANCE)) == 0,
                  "glass", "eval and pdf of a delta are 0");
@@ -773,7 +859,7 @@ static double closed_form(const light_case *l)
 static void one_light(const light_case *l, uint64_t seed)
 {
     const double exact = closed_form(l);
-    const uint32_t n = pt_test_samples(exact > 1e-6 && exact < 0.03 ? 1u << 20 : 1u << 18);
+    const uint32_t n = pt_test_samples(exact > 1e-6 && exact < 0.03 ? 1u << 19 : 1u << 17);
     const pt_vec3 o = pt_v3(0, 0, 0);
     pt_pcg32 rng = generator(seed);
     pt_scene scene = PT_SCENE_INIT;
@@ -815,6 +901,7 @@ static void one_light(const light_case *l, uint64_t seed)
 
 static void irradiance(void)
 {
+    pt_test_source("Lambert 1760 for polygons, Snyder 1996 for spheres");
     int i;
     for (i = 0; i < LIGHTS; i++) one_light(&lights[i], (uint64_t)(300 + i));
 }
@@ -822,7 +909,8 @@ static void irradiance(void)
 /* Random directions find the light with the density that pt_light_pdf_w says: it integrates to 1. */
 static void light_densities(void)
 {
-    const uint32_t n = pt_test_samples(1u << 18);
+    pt_test_source("densities integrate to 1");
+    const uint32_t n = pt_test_all_samples(1u << 18);
     int k;
     for (k = 0; k < LIGHTS; k++) {
         const light_case *const l = &lights[k];
@@ -888,8 +976,7 @@ static void one_sphere_light(const pt_case *c)
         pt_light_sample(&scene, 0, pt_v3(0, 0, 0), pt_v2(real(pt_case_number(c->inputs, "u")), real(0.125)),
                         &s)) {
         const double sint = length3(pt_v3_cross(s.wi, axis));
-        pt_check_near(c->id, 1 / s.pdf_w / omega, 1, rel + 2 * pt_gamma(1),
-                      "solid angle of a sphere light");
+        pt_check_near(c->id, 1 / s.pdf_w / omega, 1, rel + 2 * pt_gamma(1), "solid angle of a sphere light");
         pt_check(dbl(s.wi.z) <= 1 && fabs(length3(s.wi) - 1) <= 4 * pt_gamma(1), c->id, "direction");
         if (pt_case_find(c->expected, "sint", '=')) {
             const double want = pt_case_number(c->expected, "sint");
@@ -919,6 +1006,7 @@ static void sphere_lights(void)
 #if PTI_HAS_ENVIRONMENT
 static void point_and_environment(void)
 {
+    pt_test_source("closed form: pi L under a sky; inverse square law");
     pt_scene scene = PT_SCENE_INIT;
     const pt_vec3 p = pt_v3(1, 2, 3);
     pt_light_sample_result s;
@@ -946,7 +1034,8 @@ static void point_and_environment(void)
              "environment", "density of a ray that leaves");
     for (i = 0; i < (int)n; i++) {
         wrong += !pt_light_sample(&scene, environment, p, pair(&rng), &s) || s.delta ||
-                 dbl(s.radiance.r) != 2 || s.pdf_w != dbl(pt_warp_sphere_pdf_w());
+                 dbl(s.radiance.r) != 2 || s.pdf_w != dbl(pt_warp_sphere_pdf_w()) || length3(s.n) > 0 ||
+                 length3(s.p_error) > 0 || fabs(distance3(s.p, p) / dbl(s.distance) - 1) > 1e-5;
         pt_stats_add(&sky, fmax(0, dbl(s.wi.x)) * dbl(s.radiance.r) / s.pdf_w);
     }
     pt_check(wrong == 0, "environment", "%d samples are wrong", wrong);
@@ -961,6 +1050,7 @@ static void point_and_environment(void)
 /* Chosen by their share of the power: pi A L, 4 pi I. */
 static void choice_by_power(void)
 {
+    pt_test_source("shares of the power: pi A L, 4 pi I");
     pt_scene scene = PT_SCENE_INIT;
     const int dim = pt_add_material(&scene, pt_material_emitter(pt_rgb3(1, 2, 3))),
               bright = pt_add_material(&scene, pt_material_emitter(pt_rgb_grey(8)));
@@ -982,7 +1072,8 @@ static void choice_by_power(void)
         const int k =
             l->kind == PT_LIGHT_POINT ? 3 : (int)((unsigned)"\1\0\2"[scene.primitives[l->primitive].shape]);
         expected[i] = n * power[k] / all;
-        pt_check_near("share of the power", l->pmf, power[k] / all, 1e-6, "see pti_light_power");
+        pt_check_near("share of the power", l->pmf, power[k] / all, 1e-6,
+                      "luminance times area times pi, twice for what shines on both sides");
         sum += l->pmf;
     }
     pt_check_near("shares of the power", sum, 1, 1e-14, "must add up to 1");
@@ -1005,7 +1096,8 @@ static void choice_by_power(void)
 /* Each emitted ray carries L cos / (pdf_a pdf_w): the mean is the power, pi A L for each side. */
 static void emitted_power(void)
 {
-    const uint32_t n = pt_test_samples(1u << 14);
+    pt_test_source("closed form: pi A L for each side; cosine about the normal");
+    const uint32_t n = pt_test_all_samples(1u << 14);
     int k;
     for (k = 0; k < LIGHTS; k++) {
         const light_case *const l = &lights[k];
@@ -1043,6 +1135,7 @@ static void emitted_power(void)
 /* Uniform points: a triangle in 16 equal parts, a parallelogram in 64, a sphere in 64. */
 static void emitted_points(void)
 {
+    pt_test_source("uniform by area");
     static const int which[3] = {0, 14, 16};
     const uint32_t n = pt_test_samples(1u << 15);
     int k;
@@ -1088,6 +1181,7 @@ static void emitted_points(void)
 /* The share of a square's light that falls on another: form factors of unit squares (Howell's catalogue). */
 static void form_factors(void)
 {
+    pt_test_source("unit squares: opposite and perpendicular (Howell 2010)");
     static const double exact[2] = {0.19982489569838738, 0.20004377607540315};
     const uint32_t n = pt_test_samples(1u << 18);
     int k;
@@ -1125,6 +1219,7 @@ static void form_factors(void)
 /* A point light sends 4 pi I in all directions; a sky L sends 4 pi r^2 pi L onto a ball of radius r. */
 static void emission_of_the_rest(void)
 {
+    pt_test_source("closed form: 4 pi I; 4 pi r^2 pi L onto a ball");
     const uint32_t n = pt_test_samples(1u << 17);
     pt_scene scene = PT_SCENE_INIT;
     pt_pcg32 rng = generator(620);
@@ -1268,6 +1363,7 @@ static void camera_round_trip(void)
    And the density of camera rays integrates to 1 over directions. */
 static void measurement(void)
 {
+    pt_test_source("the importance of a camera integrates to 1 (Veach 1997)");
     static const double lens[2] = {0, 0.3};
     const uint32_t n = pt_test_samples(1u << 18);
     const double omc = 0.25, radius = 7; /* a cone that holds the picture */
@@ -1291,8 +1387,10 @@ static void measurement(void)
                                      ? pdf_w / pt_warp_cone_pdf_w(omc)
                                      : 0);
         }
-        pt_check_mean(k == 0 ? "a pinhole measures radiance" : "a lens measures radiance", &measured, 1, 1e-6,
-                      0.02, PT_TEST_VALUES, "see pt_camera_we");
+        pt_check_mean(
+            k == 0 ? "a pinhole measures radiance" : "a lens measures radiance", &measured, 1, 1e-6, 0.02,
+            PT_TEST_VALUES,
+            "We = 1 / (A_film A_lens cos^4), cosine at the point, over the densities of point and lens");
         if (k == 0)
             pt_check_mean("density of camera rays", &whole, 1, 1e-6, 0.02, PT_TEST_VALUES,
                           "pt_camera_pdf must integrate to 1");
@@ -1302,6 +1400,7 @@ static void measurement(void)
 /* All rays of a picture point meet in the plane in focus; elsewhere they fill the circle of confusion. */
 static void thin_lens(void)
 {
+    pt_test_source("second moment of a uniform disk: r^2/4; similar triangles");
     const pt_camera c = test_camera(0.3);
     const uint32_t n = pt_test_samples(1u << 14);
     const double z[2] = {2, 10};
@@ -1350,6 +1449,8 @@ int main(int argc, char **argv)
     PT_TEST(diffuse);
     PT_TEST(diffuse_directions);
     PT_TEST_EXACT(black_and_mirror);
+    PT_TEST_EXACT(edge_on);
+    PT_TEST_EXACT(lights_edge_on);
     PT_TEST_EXACT(fresnel_rows);
     PT_TEST(fresnel_of_diffuse_light);
     PT_TEST_EXACT(glass);
