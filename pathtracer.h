@@ -1050,7 +1050,7 @@ typedef struct pt_light {
     int primitive;           /* area: which one                                                            */
     pt_vec3 position;        /* point, spot                                                                */
     pt_vec3 direction;       /* spot, directional: where the light goes (unit)                             */
-    double cos_start, cos_end; /* spot: full intensity within the first angle, none beyond the second      */
+    double omc_start, omc_end; /* spot: 1 - cos of the angles of full intensity, and of none               */
     pt_rgb emission;         /* radiance (environment: its mean), intensity, or irradiance (directional)   */
     double area;             /* area: m^2                                                                  */
     double pmf;              /* probability to be chosen: its share of the power                           */
@@ -1110,7 +1110,7 @@ typedef struct pt_delta_light {
     pt_light_kind kind;      /* point, spot or directional                                                 */
     pt_vec3 position, direction;
     pt_rgb intensity;        /* directional: irradiance across the direction                               */
-    double cos_start, cos_end;
+    double omc_start, omc_end; /* spot: 1 - cos of its angles                                              */
 } pt_delta_light;
 
 /* An environment image with the distribution of its light over its pixels: rows by rows[], columns within row y
@@ -1500,7 +1500,8 @@ PTDEF pt_rgbd pt_li_path_light(const pt_scene *scene, const pt_ray *ray, pt_samp
 #endif
 #if PTI_HAS_WHITTED
 /* Methods of the time before path tracing; what each leaves out is the point of having it. max_edges 0 means 12
-   edges for "whitted" and "distribution", 4 for "branching".
+   edges for "whitted" and "distribution", 4 for "branching"; "whitted" and "branching" follow at most 64. Both "local"
+   and "whitted" leave out light from the environment, which has no middle, but show it as background.
    local: the slides' L = ka Ia + sum of (I/r^2) (kd max(0, n.l) + ks max(0, n.h)^p), no shadows, no reflections; kd,
    ks, p are albedo, specular, exponent; every light as if all of it came from its middle. */
 PTDEF pt_rgbd pt_li_local(const pt_scene *scene, const pt_ray *ray, pt_sampler *sampler, const pt_li_options *options,
@@ -3249,10 +3250,16 @@ PTDEF double pt_flux_spot(double intensity, double cos_start, double cos_end)
     return 2 * PT_PI * intensity * (1 - 0.5 * (cos_start + cos_end));
 }
 
+/* The falloff from 1 - cos of the three angles. */
+static double pti_spot_falloff(double omc_axis, double omc_start, double omc_end)
+{
+    double x = fmax(0, fmin(1, (omc_end - omc_axis) / (omc_end - omc_start)));
+    return x * x * (3 - 2 * x);
+}
+
 PTDEF double pt_spot_falloff(double cos_axis, double cos_start, double cos_end)
 {
-    double x = fmax(0, fmin(1, (cos_axis - cos_end) / (cos_start - cos_end)));
-    return x * x * (3 - 2 * x);
+    return pti_spot_falloff(1 - cos_axis, 1 - cos_start, 1 - cos_end);
 }
 
 PTDEF double pt_solid_angle_cap(double theta)
@@ -5518,11 +5525,26 @@ static void pti_sample_infinite(const pt_scene *scene, const pt_light *light, pt
     out->p = pt_v3_add(p, pt_v3_scale(out->wi, out->distance));
 }
 
+/* 1 - cos of the angle between w and the axis of a spot: half the square of their difference, which keeps its digits
+   for narrow cones. */
+static double pti_off_axis(const pt_light *light, pt_vec3 w)
+{
+    pti_d3 d = pti_d_sub(pti_d_normalize(pti_d_from(w)), pti_d_normalize(pti_d_from(light->direction)));
+    return 0.5 * pti_d_dot(d, d);
+}
+
+/* Is w in the cone of a spot? A direction drawn at its rim was rounded, by up to 4 u of angle, which is a relative
+   change of 2 * 4 u / angle of 1 - cos = angle^2 / 2. */
+static int pti_in_spot(const pt_light *light, pt_vec3 w)
+{
+    return pti_off_axis(light, w) <= light->omc_end + 8 * PTI_UNIT_ROUNDOFF * sqrt(light->omc_end);
+}
+
 /* Intensity of a point or spot light in direction w, which goes away from it. */
 static pt_rgb pti_intensity(const pt_light *light, pt_vec3 w)
 {
     if (light->kind != PT_LIGHT_SPOT) return light->emission;
-    return pt_rgb_scale(light->emission, (pt_real)pt_spot_falloff((double)pt_v3_dot(w, light->direction), light->cos_start, light->cos_end));
+    return pt_rgb_scale(light->emission, (pt_real)pti_spot_falloff(pti_off_axis(light, w), light->omc_start, light->omc_end));
 }
 
 static int pti_sample_point_light(const pt_light *light, pt_vec3 p, pt_light_sample_result *out)
@@ -5637,12 +5659,6 @@ static void pti_le_infinite(const pt_scene *scene, const pt_light *l, pt_vec2 u_
     out->p = pti_d_to(pti_d_add(centre, pti_d_scale(pti_d_from(pt_frame_to_world(&frame, pt_v3(disk.x, disk.y, -1))), r)));
 }
 
-/* 1 - cos of the half angle of a spot light. */
-static double pti_spot_omc(const pt_light *l)
-{
-    return 1 - l->cos_end;
-}
-
 PTDEF int pt_light_sample_le(const pt_scene *scene, int light, pt_vec2 u_p, pt_vec2 u_w, pt_real u_side,
                              pt_light_emission_result *out)
 {
@@ -5660,7 +5676,7 @@ PTDEF int pt_light_sample_le(const pt_scene *scene, int light, pt_vec2 u_p, pt_v
         out->w = pt_warp_sphere(u_w);
         if (l->kind == PT_LIGHT_SPOT) {
             frame = pt_frame_from_normal(l->direction);
-            out->w = pt_frame_to_world(&frame, pt_warp_cone(u_w, pti_spot_omc(l)));
+            out->w = pt_frame_to_world(&frame, pt_warp_cone(u_w, l->omc_end));
             out->radiance = pti_intensity(l, out->w);
         }
     } else {
@@ -5678,7 +5694,7 @@ PTDEF void pt_light_pdf_le(const pt_scene *scene, int light, pt_vec3 n, pt_vec3 
     *pdf_w = (double)pt_warp_sphere_pdf_w();
     switch (l->kind) {
     case PT_LIGHT_POINT: return;
-    case PT_LIGHT_SPOT: *pdf_w = (double)pt_v3_dot(w, l->direction) > l->cos_end ? pt_warp_cone_pdf_w(pti_spot_omc(l)) : 0; return;
+    case PT_LIGHT_SPOT: *pdf_w = pti_in_spot(l, w) ? pt_warp_cone_pdf_w(l->omc_end) : 0; return;
     case PT_LIGHT_DIRECTIONAL: *pdf_w = 1; break;
     case PT_LIGHT_ENVIRONMENT:
 #if PTI_HAS_ENVIRONMENT
@@ -6065,7 +6081,7 @@ static int pti_add_delta_light(pt_scene *scene, const char *item, const pt_delta
     if (!pti_check_rgb(scene, item, n, "intensity", l->intensity, HUGE_VAL)) return -1;
     if (l->kind != PT_LIGHT_POINT && !(pt_v3_dot(l->direction, l->direction) > PTI_R(0.5)))
         return pti_scene_fail(scene, PT_ERROR_SCENE, item, n, "its direction is zero");
-    if (l->kind == PT_LIGHT_SPOT && !(l->cos_end < l->cos_start))
+    if (l->kind == PT_LIGHT_SPOT && !(l->omc_start < l->omc_end))
         return pti_scene_fail(scene, PT_ERROR_SCENE, item, n, "its angles are not 0 <= start < end <= 180 degrees");
     return PTI_PUSH(scene, item, delta_lights, delta_light_count, delta_light_capacity, *l);
 }
@@ -6092,8 +6108,11 @@ PTDEF int pt_add_spot_light(pt_scene *scene, pt_vec3 position, pt_vec3 direction
 {
     pt_delta_light l = pti_delta_light(PT_LIGHT_SPOT, position, direction, intensity);
     int ok = start_deg >= 0 && start_deg < end_deg && end_deg <= 180;
-    l.cos_start = ok ? cos(start_deg * (PT_PI / 180)) : 0;
-    l.cos_end = ok ? cos(end_deg * (PT_PI / 180)) : 1; /* refused below */
+    if (ok) {
+        double a = sin(start_deg * (PT_PI / 360)), b = sin(end_deg * (PT_PI / 360));
+        l.omc_start = 2 * a * a;
+        l.omc_end = 2 * b * b;
+    }
     return pti_add_delta_light(scene, "spot light", &l);
 }
 
@@ -6158,7 +6177,7 @@ PTDEF int pt_set_environment_image(pt_scene *scene, const float *rgb, int width,
     if (!rgb || width < 1 || height < 1 || width > 65536 || height > 65536)
         return pti_scene_fail(scene, PT_ERROR_ARGUMENT, "environment", 0, "the image is empty or larger than 65536 x 65536");
     if (!(scale >= 0) || !pti_finite(scale)) return pti_scene_fail_value(scene, "environment", 0, "scale", scale, "is negative or not finite");
-    if (!pti_check_pixels(scene, "environment", 0, rgb, 3 * pixels, HUGE_VAL)) return -1;
+    if (!pti_check_pixels(scene, "environment", 0, rgb, 3 * pixels, scale > 1 ? (double)PTI_REAL_MAX / scale : HUGE_VAL)) return -1;
     pti_map_free(scene);
     m.width = width;
     m.height = height;
@@ -6269,7 +6288,7 @@ static double pti_light_power(const pt_scene *scene, const pt_light *l)
     double mean = ((double)l->emission.r + (double)l->emission.g + (double)l->emission.b) / 3;
     if (l->kind == PT_LIGHT_AREA) return PT_PI * l->area * mean;
     if (l->kind == PT_LIGHT_POINT) return pt_flux_point(mean);
-    if (l->kind == PT_LIGHT_SPOT) return pt_flux_spot(mean, l->cos_start, l->cos_end);
+    if (l->kind == PT_LIGHT_SPOT) return pt_flux_spot(mean, 1 - l->omc_start, 1 - l->omc_end);
     if (l->kind == PT_LIGHT_DIRECTIONAL) return PT_PI * r * r * mean;
     return PT_PI * mean * 4 * PT_PI * r * r;
 }
@@ -6295,8 +6314,8 @@ static void pti_collect_lights(pt_scene *scene)
         l.primitive = -1;
         l.position = scene->delta_lights[i].position;
         l.direction = scene->delta_lights[i].direction;
-        l.cos_start = scene->delta_lights[i].cos_start;
-        l.cos_end = scene->delta_lights[i].cos_end;
+        l.omc_start = scene->delta_lights[i].omc_start;
+        l.omc_end = scene->delta_lights[i].omc_end;
         l.emission = scene->delta_lights[i].intensity;
         if (!pti_rgb_black(l.emission)) scene->lights[scene->light_count++] = l;
     }
@@ -6862,7 +6881,7 @@ PTDEF void pt_film_error(const pt_film *film, const float *reference, pt_error *
 
 enum { PTI_TECHNIQUE_PLAIN, PTI_TECHNIQUE_LIGHT, PTI_TECHNIQUE_MIS, PTI_TECHNIQUE_DISTRIBUTION };
 
-#if PTI_HAS_LPE || PTI_HAS_WHITTED
+#if PTI_HAS_LPE || PTI_HAS_WHITTED || PTI_HAS_OBSERVER
 /* The share of lobe `lobe` in the whole BSDF at a direction, per band; 0 where the whole is 0. */
 static pt_rgbd pti_lobe_share(const pt_bsdf *bsdf, pt_vec3 wo, pt_vec3 wi, unsigned lobe)
 {
@@ -7193,24 +7212,49 @@ static void pti_observe(const pti_walk *w, int edges, pt_rgbd value)
 }
 #endif
 
-/* Adds beta * value * weight; lobe: of the surface that a light was sampled from, 0 if the walk hit it. */
-PTI_INLINE void pti_contribute(pti_walk *w, pt_rgb value, double weight, int edges, unsigned lobe, const unsigned features)
+/* Tells observer and classes of a contribution; lobe: of the surface that a light was sampled from, 0 if the walk
+   hit it. */
+PTI_INLINE void pti_tell(pti_walk *w, pt_rgbd c, int edges, unsigned lobe, const unsigned features)
+{
+#if PTI_HAS_OBSERVER
+    if ((features & PTI_WITH_OBSERVER) && w->options->observer) {
+        if (lobe && edges - 1 <= PT_WORD_MAX) w->letters[edges - 2] = pti_letter(lobe);
+        pti_observe(w, edges, c);
+    }
+#endif
+#if PTI_HAS_LPE
+    if ((features & PTI_WITH_LPE) && w->lpe) pti_classify(w->lpe, w->share, w->classes, lobe, c);
+#endif
+    (void)w;
+    (void)c;
+    (void)edges;
+    (void)lobe;
+    (void)features;
+}
+
+/* Adds beta * value * weight, and returns it. */
+PTI_INLINE pt_rgbd pti_add_light(pti_walk *w, pt_rgb value, double weight)
 {
     pt_rgbd c = pt_rgbd3(w->beta.r * (double)value.r * weight, w->beta.g * (double)value.g * weight,
                          w->beta.b * (double)value.b * weight);
     w->sum.r += c.r;
     w->sum.g += c.g;
     w->sum.b += c.b;
-#if PTI_HAS_OBSERVER
-    if ((features & PTI_WITH_OBSERVER) && w->options->observer) pti_observe(w, edges, c);
-#endif
-#if PTI_HAS_LPE
-    if ((features & PTI_WITH_LPE) && w->lpe) pti_classify(w->lpe, w->share, w->classes, lobe, c);
-#endif
-    (void)edges;
-    (void)lobe;
-    (void)features;
+    return c;
 }
+
+#if PTI_HAS_OBSERVER || PTI_HAS_LPE
+/* Tells of a contribution, added as a whole, by the lobes that scattered it: watching changes no bit of the sum. */
+static void pti_tell_lobes(pti_walk *w, const pt_bsdf *bsdf, pt_vec3 wi, pt_rgbd c, const unsigned features)
+{
+    pt_rgbd d = pt_rgbd3(0, 0, 0);
+    int diffuse = (bsdf->lobes & PT_LOBE_DIFFUSE) != 0, glossy = (bsdf->lobes & PT_LOBE_GLOSSY) != 0;
+    if (diffuse && glossy) d = pti_lobe_share(bsdf, pt_v3_neg(w->d), wi, PT_LOBE_DIFFUSE);
+    else if (diffuse) d = pt_rgbd3(1, 1, 1);
+    if (diffuse) pti_tell(w, pt_rgbd3(c.r * d.r, c.g * d.g, c.b * d.b), w->edges + 1, PT_LOBE_DIFFUSE, features);
+    if (glossy) pti_tell(w, pt_rgbd3(c.r * (1 - d.r), c.g * (1 - d.g), c.b * (1 - d.b)), w->edges + 1, PT_LOBE_GLOSSY, features);
+}
+#endif
 
 /* Emission that the last direction found: all of it where no other technique could, its share otherwise. */
 PTI_INLINE double pti_emission_weight(const pti_walk *w, int light, const pt_hit *hit, const int technique)
@@ -7238,7 +7282,8 @@ PTI_INLINE void pti_direct(pti_walk *w, const pt_bsdf *bsdf, pt_vec3 wo, const u
     pt_real c;
     pt_vec2 u;
     pt_rgb f;
-    double pmf, p, weight, diffuse_weight;
+    pt_rgbd sum;
+    double pmf, p, weight;
     int light;
     if ((features & PTI_WITH_SPECULAR) && !(bsdf->lobes & (PT_LOBE_DIFFUSE | PT_LOBE_GLOSSY))) return;
     pt_sampler_seek(w->sampler, dimension + PT_DIM_LIGHT_CHOICE);
@@ -7255,24 +7300,19 @@ PTI_INLINE void pti_direct(pti_walk *w, const pt_bsdf *bsdf, pt_vec3 wo, const u
     p = pmf * ls.pdf_w;
     weight = technique >= PTI_TECHNIQUE_MIS && !ls.delta
                  ? pt_mis_weight(p, (double)pt_bsdf_pdf_w(bsdf, wo, ls.wi, PT_RADIANCE), w->options->heuristic) : 1.0;
-    weight *= (double)c / p;
-    diffuse_weight = technique == PTI_TECHNIQUE_DISTRIBUTION ? (double)c / p : weight; /* see pti_drop_diffuse */
-#if PTI_HAS_OBSERVER || PTI_HAS_LPE || PTI_HAS_WHITTED
-    if (technique == PTI_TECHNIQUE_DISTRIBUTION || pti_is_watched(w, features)) { /* one contribution for each lobe */
-        unsigned lobe;
-        for (lobe = PT_LOBE_DIFFUSE; lobe <= PT_LOBE_GLOSSY; lobe <<= 1) {
-            if (!(bsdf->lobes & lobe)) continue;
-#if PTI_HAS_OBSERVER
-            if (w->edges <= PT_WORD_MAX) w->letters[w->edges - 1] = pti_letter(lobe);
-#endif
-            f = pt_bsdf_eval(bsdf, wo, ls.wi, PT_RADIANCE, lobe);
-            pti_contribute(w, pt_rgb_mul(f, ls.radiance), lobe == PT_LOBE_DIFFUSE ? diffuse_weight : weight, w->edges + 1, lobe, features);
-        }
+#if PTI_HAS_WHITTED
+    if (technique == PTI_TECHNIQUE_DISTRIBUTION) { /* light on the diffuse part is sampled only: see pti_drop_diffuse */
+        pt_rgb d = pt_bsdf_eval(bsdf, wo, ls.wi, PT_RADIANCE, PT_LOBE_DIFFUSE), g = pt_bsdf_eval(bsdf, wo, ls.wi, PT_RADIANCE, PT_LOBE_GLOSSY);
+        pti_tell(w, pti_add_light(w, pt_rgb_mul(d, ls.radiance), (double)c / p), w->edges + 1, PT_LOBE_DIFFUSE, features);
+        pti_tell(w, pti_add_light(w, pt_rgb_mul(g, ls.radiance), weight * (double)c / p), w->edges + 1, PT_LOBE_GLOSSY, features);
         return;
     }
 #endif
-    (void)diffuse_weight;
-    pti_contribute(w, pt_rgb_mul(f, ls.radiance), weight, w->edges + 1, 0, features);
+    sum = pti_add_light(w, pt_rgb_mul(f, ls.radiance), weight * ((double)c / p));
+#if PTI_HAS_OBSERVER || PTI_HAS_LPE
+    if (pti_is_watched(w, features)) pti_tell_lobes(w, bsdf, ls.wi, sum, features);
+#endif
+    (void)sum;
 }
 
 #if PTI_HAS_WHITTED
@@ -7359,7 +7399,7 @@ PTI_INLINE void pti_contribute_environment(pti_walk *w, const int technique, con
 #if PTI_HAS_ENVIRONMENT
     pt_rgb emission = pt_environment_radiance(w->scene, w->d);
     if (!pti_rgb_black(emission))
-        pti_contribute(w, emission, pti_emission_weight(w, w->scene->environment_light, NULL, technique), w->edges, 0, features);
+        pti_tell(w, pti_add_light(w, emission, pti_emission_weight(w, w->scene->environment_light, NULL, technique)), w->edges, 0, features);
 #endif
     (void)w;
     (void)technique;
@@ -7407,7 +7447,7 @@ PTI_INLINE pt_rgbd pti_path(const pt_scene *scene, const pt_ray *ray, pt_sampler
         if (w.hit.light >= 0) {
             emission = pt_hit_emission(scene, &w.hit, wo);
             if (!pti_rgb_black(emission))
-                pti_contribute(&w, emission, pti_emission_weight(&w, w.hit.light, &w.hit, technique), w.edges, 0, features);
+                pti_tell(&w, pti_add_light(&w, emission, pti_emission_weight(&w, w.hit.light, &w.hit, technique)), w.edges, 0, features);
         }
         if (w.edges == options->max_edges) break;
         if (!bsdf.lobes) break; /* black */
@@ -7463,7 +7503,9 @@ PTDEF pt_rgbd pt_li_path_light(const pt_scene *scene, const pt_ray *ray, pt_samp
 /* Light from the middle of light k as if all of it came from there: irradiance across the direction; 0: none. */
 static int pti_middle_of_light(const pt_scene *scene, int k, const pt_hit *hit, pt_vec3 wo, pt_light_sample_result *ls)
 {
-    if (!pt_light_sample(scene, k, pti_offset(hit->p, hit->p_error, hit->ng, wo), pt_v2(PTI_R(0.5), PTI_R(0.5)), ls)) return 0;
+    const pt_light *l = &scene->lights[k];
+    int ball = l->kind == PT_LIGHT_AREA && scene->primitives[l->primitive].shape == PT_SHAPE_SPHERE; /* a cone has its axis at 0 */
+    if (!pt_light_sample(scene, k, pti_offset(hit->p, hit->p_error, hit->ng, wo), pt_v2(ball ? 0 : PTI_R(0.5), PTI_R(0.5)), ls)) return 0;
     ls->radiance = pt_rgb3((pt_real)((double)ls->radiance.r / ls->pdf_w), (pt_real)((double)ls->radiance.g / ls->pdf_w),
                            (pt_real)((double)ls->radiance.b / ls->pdf_w));
     return 1;
@@ -8294,8 +8336,8 @@ static void pti_hash_lights(uint64_t *h, const pt_scene *s)
         pti_hash_vec(h, s->delta_lights[i].position);
         pti_hash_vec(h, s->delta_lights[i].direction);
         pti_hash_rgb(h, s->delta_lights[i].intensity);
-        pti_hash_double(h, s->delta_lights[i].cos_start);
-        pti_hash_double(h, s->delta_lights[i].cos_end);
+        pti_hash_double(h, s->delta_lights[i].omc_start);
+        pti_hash_double(h, s->delta_lights[i].omc_end);
     }
     pti_hash_rgb(h, s->environment);
 #if PTI_HAS_ENVIRONMENT
@@ -8625,14 +8667,14 @@ static int pti_not_negative(double x)
     return x >= 0 && pti_finite(x);
 }
 
-/* Why there is no such method. */
+/* The switch that left a method out, NULL if none did. */
 static const char *pti_method_left_out(const char *name)
 {
     static const char *const names[6] = {"path-light", "path-plain", "local", "whitted", "distribution", "branching"};
     int k;
     for (k = 0; k < 6; k++)
         if (strcmp(names[k], name) == 0) return k < 2 ? "desc.method was left out: PT_ONLY_PATH" : "desc.method was left out: PT_NO_WHITTED";
-    return "desc.method is unknown";
+    return NULL;
 }
 
 /* What is wrong with a desc (its defaults filled in), NULL if nothing. */
@@ -8670,7 +8712,7 @@ static const char *pti_check_desc(const pt_render_desc *d)
     if (!pti_rgb_finite(o->ambient)) return "desc.li.ambient is not finite";
 #endif
     if (o->roulette == PT_ROULETTE_NONE && o->max_edges == 0) return "without roulette desc.li.max_edges must end the paths";
-    if (!pt_method_find(d->method)) return pti_method_left_out(d->method);
+    if (!pt_method_find(d->method)) return pti_method_left_out(d->method) ? pti_method_left_out(d->method) : "desc.method is unknown";
 #if PTI_HAS_LPE
     if (o->lpe && !pt_method_find(d->method)->classes) return "desc.li.lpe: this method cannot tell classes of light paths apart";
     if (o->lpe && (o->lpe->class_count < 1 || o->lpe->state_count < 1)) return "desc.li.lpe was not compiled";
@@ -8816,6 +8858,7 @@ PTDEF pt_result pt_render(const pt_scene *scene, const pt_render_desc *desc, pt_
     p.start = p.last_call = pt_wall_seconds();
     p.cpu_start = pt_cpu_seconds();
     report->error = pti_check_desc(&d);
+    if (!pt_method_find(d.method) && pti_method_left_out(d.method)) result = PT_ERROR_LEFT_OUT;
     if (!scene->committed) {
         result = scene->error != PT_OK ? scene->error : PT_ERROR_NOT_COMMITTED;
         report->error = scene->error != PT_OK ? scene->error_text : pt_result_string(result);
