@@ -1,4 +1,4 @@
-/* test_lights.c: spot, sun and sky; how they are added; pixel filters [PT-05, PT-09, PT-10].
+/* test_lights.c: spot, sun and sky; how they are added; pixel filters; canonical scenes [PT-05, PT-09, PT-10, PT-19].
 
        cc -O2 -ffp-contract=off -I. tests/test_lights.c -o test_lights -lm -pthread && ./test_lights
 
@@ -875,6 +875,199 @@ static void filtered_pictures(void)
 }
 #endif
 
+#if PTI_HAS_SCENES && PTI_HAS_ENVIRONMENT && PTI_HAS_TEXTURES
+/* ---- canonical scenes ------------------------------------------------------------------------------- */
+
+static pt_scene scene_of(const char *name, pt_camera *camera)
+{
+    const pt_scene_entry *const entry = pt_scene_find(name);
+    pt_scene scene = PT_SCENE_INIT;
+    if (!entry || entry->make(&scene, camera) != PT_OK) pt_check(0, name, "cannot be made: %s", pt_scene_error(&scene));
+    return scene;
+}
+
+/* Each scene commits and uses what it is there for; whether it has a tree is a matter of its size. */
+static void scene_needs(void)
+{
+    enum { T = PT_NEEDS_TRIANGLES, P = PT_NEEDS_PARALLELOGRAMS, S = PT_NEEDS_SPHERES, D = PT_NEEDS_DIFFUSE, M = PT_NEEDS_MIRROR, G = PT_NEEDS_DIELECTRIC, A = PT_NEEDS_AREA_LIGHTS };
+    static const struct { const char *name; unsigned needs; } row[12] = {
+        {"cornell", T | D | A}, {"cornell-empty", T | D | A}, {"cornell-spheres", T | S | D | M | G | A}, {"furnace", P | D | A}, {"diffuse-sphere", S | D | PT_NEEDS_POINT_LIGHTS},
+        {"glass-ball", P | S | D | G | A}, {"smallpt", S | D | M | G | A}, {"veach-plates", P | S | D | PT_NEEDS_CONDUCTOR | PT_NEEDS_ROUGHNESS | A},
+        {"glossy-box", P | S | D | M | G | PT_NEEDS_PHONG | A}, {"caustic-ring", T | P | S | D | M | A | PT_NEEDS_SHADING_NORMALS},
+        {"pool", P | D | M | G | PT_NEEDS_ENVIRONMENT},
+        {"materials", P | S | D | M | G | PT_NEEDS_OREN_NAYAR | PT_NEEDS_PHONG | PT_NEEDS_BLINN | PT_NEEDS_COAT | PT_NEEDS_CONDUCTOR | PT_NEEDS_ROUGHNESS | PT_NEEDS_TEXTURES |
+                          PT_NEEDS_ENVIRONMENT | PT_NEEDS_ENVIRONMENT_IMAGE}};
+    int count, i;
+    const pt_scene_entry *const entry = pt_scenes(&count);
+    pt_check(count == 12, "pt_scenes", "%d scenes", count);
+    for (i = 0; i < 12 && i < count; i++) {
+        pt_camera camera;
+        pt_scene s = scene_of(row[i].name, &camera);
+        char words[400];
+        pt_check(strcmp(entry[i].name, row[i].name) == 0 && entry[i].summary[0] && s.committed && (pt_scene_needs(&s) & ~(unsigned)PT_NEEDS_BVH) == row[i].needs && dbl(camera.tan_half) > 0,
+                 label("scene %s", row[i].name), "%s: needs %s", entry[i].name, pt_scene_needs_string(&s, words, sizeof words));
+        pt_check(s.degenerate_count == 0, label("scene %s", row[i].name), "%u degenerate shapes", (unsigned)s.degenerate_count);
+        pt_scene_free(&s);
+    }
+    pt_check(pt_scene_find("no such scene") == NULL && pt_scene_find(NULL) == NULL, "pt_scene_find", "finds a scene that is not there");
+}
+
+static double mean_of(pt_rgbd c) { return (c.r + c.g + c.b) / 3; }
+
+/* Two methods in the part [x0,x1] x [y0,y1] of a picture, with the same random numbers: what both see alike, lamps and caustics
+   that are hit, does not disturb the difference. 64 means of n Sobol points each; *level is the mean of b. */
+static pt_stats difference_of(const pt_scene *scene, const pt_camera *camera, pt_li_fn a, pt_li_fn b, const double window[4], uint64_t seed, uint32_t n, double *level)
+{
+    pt_sampler sampler = pt_sampler_make(PT_SAMPLER_SOBOL, pt_test_seed(seed), 0);
+    pt_stats s = PT_STATS_INIT;
+    pt_li_options options;
+    pt_li_info info;
+    uint32_t unit, i;
+    memset(&options, 0, sizeof options);
+    memset(&info, 0, sizeof info);
+    options.max_edges = 8;
+    *level = 0;
+    n = pt_test_samples(n);
+    for (unit = 0; unit < 64; unit++) {
+        double sum = 0, of_b = 0;
+        for (i = 0; i < n; i++) {
+            pt_vec2 u;
+            pt_ray ray;
+            pt_sampler_start(&sampler, unit, i);
+            u = pt_sampler_2d(&sampler);
+            ray = pt_camera_ray(camera, 1, (pt_real)(window[0] + (window[1] - window[0]) * dbl(u.x)), (pt_real)(window[2] + (window[3] - window[2]) * dbl(u.y)), pt_v2(0, 0));
+            sum += mean_of(a(scene, &ray, &sampler, &options, &info));
+            pt_sampler_start(&sampler, unit, i);
+            of_b += mean_of(b(scene, &ray, &sampler, &options, &info));
+        }
+        pt_stats_add(&s, (sum - of_b) / n);
+        *level += of_b / n / 64;
+    }
+    return s;
+}
+
+/* F + (1-F)/n^2 rho (1 - Rd) / (1 - rho Rd'), at the angle of the ray: what the header's comment says. Fresnel by the textbook. */
+static void pool_in_closed_form(void)
+{
+    static const double at[5][2] = {{0.5, 0.95}, {0.5, 0.7}, {0.4, 0.5}, {0.6, 0.4}, {0.5, 0.33}};
+    const double n = 1.33, rho = 0.5;
+    pt_camera camera;
+    pt_scene scene = scene_of("pool", &camera);
+    int k;
+    for (k = 0; k < 5; k++) {
+        const pt_ray ray = pt_camera_ray(&camera, 1, (pt_real)at[k][0], (pt_real)at[k][1], pt_v2(0, 0));
+        const double c = -dbl(ray.d.y), t = sqrt(1 - (1 - c * c) / (n * n)), s = (c - n * t) / (c + n * t), p = (n * c - t) / (n * c + t), F = 0.5 * (s * s + p * p);
+        const double exact = F + (1 - F) / (n * n) * rho * (1 - pt_fresnel_diffuse(n)) / (1 - rho * pt_fresnel_diffuse(1 / n));
+        pt_sampler sampler = pt_sampler_make(PT_SAMPLER_INDEPENDENT, pt_test_seed(200 + (uint64_t)k), 0);
+        const uint32_t paths = pt_test_samples(72000);
+        pt_stats stats = PT_STATS_INIT;
+        pt_li_options options;
+        pt_li_info info;
+        pt_hit hit;
+        uint32_t i;
+        memset(&options, 0, sizeof options);
+        memset(&info, 0, sizeof info);
+        options.max_edges = 100; /* what is left after them has met the floor 20 times at least */
+        options.roulette = PT_ROULETTE_NONE;
+        pt_check(pt_intersect(&scene, &ray, &hit) && scene.materials[hit.material].kind == PT_MATERIAL_DIELECTRIC, "a pixel of the pool", "does not see the water");
+        for (i = 0; i < paths; i++) {
+            pt_sampler_start(&sampler, 0, i);
+            pt_stats_add(&stats, pt_li_path(&scene, &ray, &sampler, &options, &info).g);
+        }
+        pt_check_mean(label("pool, %.1f degrees", acos(c) * 180 / PT_PI), &stats, exact, 1e-5, 0.02, PT_TEST_VALUES, "the walls mirror without loss; radiance in water is that above times (1-F)/n^2");
+    }
+    pt_scene_free(&scene);
+}
+
+/* Six parts of Veach's picture, nothing left out: three estimators, one mean. */
+static void veach_plates(void)
+{
+    static const pt_li_fn li[3] = {pt_li_path, pt_li_path_light, pt_li_path_plain};
+    static const char *const name[3] = {"path", "light", "plain"};
+    pt_camera camera;
+    pt_scene scene = scene_of("veach-plates", &camera);
+    int block, m;
+    for (block = 0; block < 6; block++) {
+        const double window[4] = {block % 2 * 0.5, block % 2 * 0.5 + 0.5, (block / 2) / 3.0, (block / 2 + 1) / 3.0};
+        for (m = 1; m < 3; m++) {
+            double level;
+            const pt_stats s = difference_of(&scene, &camera, li[m], li[0], window, 210 + (uint64_t)(2 * block + m), 1000, &level);
+            pt_check_mean(label("veach-plates, part %d of mean %.3f: %s - path", block, level, name[m]), &s, 0, 1e-5 * level, 0, PT_TEST_MEANS, "densities of GGX, of the light choice, or the weights of MIS");
+        }
+    }
+    pt_scene_free(&scene);
+}
+
+#if PTI_HAS_LPE
+/* Radiance of class LSDE from a strip of the ring's floor around (x, 0, 0), found by hitting the lamp. */
+static double ring_caustic(const pt_scene *scene, const pt_lpe *lpe, double x, uint64_t seed, uint32_t n)
+{
+    pt_sampler sampler = pt_sampler_make(PT_SAMPLER_SOBOL, pt_test_seed(seed), 0);
+    double sum = 0;
+    uint32_t i;
+    for (i = 0; i < n; i++) {
+        pt_rgbd classes[2] = {{0, 0, 0}, {0, 0, 0}};
+        pt_li_options options;
+        pt_li_info info;
+        pt_vec2 u;
+        pt_ray ray;
+        memset(&options, 0, sizeof options);
+        memset(&info, 0, sizeof info);
+        options.max_edges = 3;
+        options.lpe = lpe;
+        info.classes = classes;
+        pt_sampler_start(&sampler, 0, i);
+        u = pt_sampler_2d(&sampler);
+        ray = ray_from(v3(x + 0.05 * (dbl(u.x) - 0.5), 0.01, 0.04 * (dbl(u.y) - 0.5)), v3(0, -1, 0));
+        (void)pt_li_path_plain(scene, &ray, &sampler, &options, &info);
+        sum += classes[0].g;
+    }
+    return sum / n;
+}
+
+/* Seen from above light goes along +x, from 7.155 away, onto the far wall of the ring, a mirror of radius 1: 1/o + 1/i = 2 with
+   o = 8.155 puts the cusp i = 0.533 before the wall, at x = 0.467 (a half for parallel light). The lamp, 1 across, blurs it by
+   0.5 i/o = 0.033 to each side. Beyond the cusp the arms of the caustic z = 0.544 a^(3/2), a = 2 (x - 0.467) (from x = 1/(2 cos
+   phi), z = y (a - y^2/2)), are closer than that up to a = 0.154: the light on the axis is brightest between x = 0.467 - 0.033
+   and 0.467 + 0.077. Strips are 0.05 wide, which adds half a strip. */
+static void ring_cusp(void)
+{
+    const char *const expression = "LSDE";
+    const uint32_t n = pt_test_samples(30000);
+    pt_camera camera;
+    pt_scene scene = scene_of("caustic-ring", &camera);
+    double best = 0, at = 0, left;
+    pt_lpe lpe;
+    int k;
+    pt_check(pt_lpe_compile(&lpe, &expression, 1, NULL) == PT_OK, "LSDE", "is refused");
+    for (k = 0; k < 13; k++) {
+        const double x = 0.2 + 0.05 * k, value = ring_caustic(&scene, &lpe, x, 240 + (uint64_t)k, n);
+        if (value > best) at = x;
+        best = fmax(best, value);
+    }
+    left = ring_caustic(&scene, &lpe, 0.2, 255, n);
+    pt_check(at > 0.467 - 0.033 - 0.025 && at < 0.467 + 0.077 + 0.025, "cusp of the nephroid", "the light on the axis is brightest at x = %g, not near half a radius", at);
+    pt_check(best > 2 * left, "cusp of the nephroid", "is only %g times as bright as the floor before it", best / left);
+    pt_scene_free(&scene);
+}
+#endif
+
+/* Light sampling finds the lamp but through no mirror: all methods find the caustic by hitting the lamp. The plain one finds the
+   rest by luck too, so its picture has no bound. */
+static void ring_methods(void)
+{
+    static const double all[4] = {0, 1, 0, 1};
+    pt_camera camera;
+    pt_scene scene = scene_of("caustic-ring", &camera);
+    double level;
+    pt_stats s = difference_of(&scene, &camera, pt_li_path, pt_li_path_plain, all, 260, 2500, &level);
+    pt_check_mean(label("caustic-ring of mean %.3f: path - plain", level), &s, 0, 1e-5 * level, 0, PT_TEST_MEANS, "a caustic counts once: after a mirror all of the lamp, after the floor its share");
+    s = difference_of(&scene, &camera, pt_li_path, pt_li_path_light, all, 261, 600, &level);
+    pt_check_mean(label("caustic-ring of mean %.3f: path - light", level), &s, 0, 1e-5 * level, 0.02 * level, PT_TEST_MEANS, "light sampling must count the lamp after a mirror, and not after the floor");
+    pt_scene_free(&scene);
+}
+#endif
+
 int main(int argc, char **argv)
 {
     pt_test_begin("test_lights", argc, argv);
@@ -905,6 +1098,15 @@ int main(int argc, char **argv)
     PT_TEST(filter_moments);
 #if PTI_HAS_TEXTURES
     PT_TEST(filtered_pictures);
+#endif
+#if PTI_HAS_SCENES && PTI_HAS_ENVIRONMENT && PTI_HAS_TEXTURES
+    PT_TEST_EXACT(scene_needs);
+    PT_TEST(pool_in_closed_form);
+    PT_TEST(veach_plates);
+#if PTI_HAS_LPE
+    PT_TEST_EXACT(ring_cusp);
+#endif
+    PT_TEST(ring_methods);
 #endif
     return pt_test_end();
 }
