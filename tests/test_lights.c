@@ -12,7 +12,10 @@
 static double dbl(pt_real x) { return (double)x; }
 static pt_rgb grey(double v) { return pt_rgb_grey((pt_real)v); }
 static pt_vec3 v3(double x, double y, double z) { return pt_v3((pt_real)x, (pt_real)y, (pt_real)z); }
-static double dot3(pt_vec3 a, pt_vec3 b) { return dbl(a.x) * dbl(b.x) + dbl(a.y) * dbl(b.y) + dbl(a.z) * dbl(b.z); }
+static double dot3(pt_vec3 a, pt_vec3 b)
+{
+    return dbl(a.x) * dbl(b.x) + dbl(a.y) * dbl(b.y) + dbl(a.z) * dbl(b.z);
+}
 static double unit_roundoff(void) { return sizeof(pt_real) == sizeof(float) ? 0x1p-24 : 0x1p-53; }
 static double degrees(double x) { return x * PT_PI / 180; }
 
@@ -54,7 +57,8 @@ static pt_ray ray_from(pt_vec3 o, pt_vec3 d)
 }
 
 /* One path of two edges (direct light) that starts at o towards d. */
-static pt_rgbd direct_light(const pt_scene *scene, pt_li_fn li, pt_vec3 o, pt_vec3 d, uint64_t seed, uint32_t sample)
+static pt_rgbd direct_light(const pt_scene *scene, pt_li_fn li, pt_vec3 o, pt_vec3 d, uint64_t seed,
+                            uint32_t sample)
 {
     pt_sampler sampler = pt_sampler_make(PT_SAMPLER_INDEPENDENT, pt_test_seed(seed), 0);
     const pt_ray ray = ray_from(o, d);
@@ -105,15 +109,20 @@ static void spot_irradiance(void)
                 pt_light_sample_result s;
                 const int lit = pt_light_sample(&scene, 0, p, pt_v2(0, 0), &s);
                 const double got = lit ? dbl(s.radiance.r) : 0, most = I / (distance[k] * distance[k]);
-                const double far = 16 * unit_roundoff() * 4 / distance[k]; /* p is rounded: its angle and its distance */
-                pt_check(fabs(got - exact) <= (slack + far) * most, label("spot, %g degrees, %g m", angle[i], distance[k]),
+                const double far =
+                    16 * unit_roundoff() * 4 / distance[k]; /* p is rounded: its angle and its distance */
+                pt_check(fabs(got - exact) <= (slack + far) * most,
+                         label("spot, %g degrees, %g m", angle[i], distance[k]),
                          "got %.9g, exact %.9g: intensity times falloff over d^2", got, exact);
-                pt_check(lit == (exact > 0) && (!lit || (s.delta && !s.infinite && s.pdf_w == 1 && dot3(s.wi, w) < -0.999)),
+                pt_check(lit == (exact > 0) &&
+                             (!lit || (s.delta && !s.infinite && s.pdf_w == 1 && dot3(s.wi, w) < -0.999)),
                          "sample of a spot light", "is not that of a point light, or shines beyond its rim");
-                pt_check(!lit || (fabs(dbl(s.radiance.g) - 0.5 * got) <= 1e-6 * got && dbl(s.radiance.b) == 0), "colour of a spot light",
-                         "falloff must scale all bands");
+                pt_check(!lit ||
+                             (fabs(dbl(s.radiance.g) - 0.5 * got) <= 1e-6 * got && dbl(s.radiance.b) == 0),
+                         "colour of a spot light", "falloff must scale all bands");
             }
-    pt_check_near("falloff half way in the cosine", pt_spot_falloff(0.5 * (cos(start) + cos(end)), cos(start), cos(end)), 0.5, 1e-12,
+    pt_check_near("falloff half way in the cosine",
+                  pt_spot_falloff(0.5 * (cos(start) + cos(end)), cos(start), cos(end)), 0.5, 1e-12,
                   "a smoothstep in the cosine is 1/2 in the middle");
     pt_check(pt_light_pdf_w(&scene, 0, v3(0, 0, 0), axis, NULL) == 0, "spot light", "a ray cannot hit it");
     pt_scene_free(&scene);
@@ -130,13 +139,14 @@ static void spot_on_floor(void)
     scene = committed(scene);
     for (i = 0; i < 6; i++) {
         const double d = sqrt(4 + x[i] * x[i]), f = falloff_by_hand(atan2(x[i], 2), degrees(20), degrees(50));
-        pt_check_near(label("floor under a spot, %g m aside", x[i]), floor_radiance(&scene, x[i], 0), 0.5 / PT_PI * 10 * f * 2 / (d * d * d),
-                      64 * unit_roundoff(), "path tracing must use the spot's intensity in the direction of the point");
+        pt_check_near(label("floor under a spot, %g m aside", x[i]), floor_radiance(&scene, x[i], 0),
+                      0.5 / PT_PI * 10 * f * 2 / (d * d * d), 64 * unit_roundoff(),
+                      "path tracing must use the spot's intensity in the direction of the point");
     }
     pt_add_parallelogram(&scene, v3(-0.2, 1, -0.2), v3(0.4, 0, 0), v3(0, 0, 0.4), 0);
     scene = committed(scene);
-    pt_check(floor_radiance(&scene, 0.3, 0) == 0 && floor_radiance(&scene, 0.5, 0) > 0, "shadow of a spot light",
-             "the shadow of a plate half way up is twice as wide");
+    pt_check(floor_radiance(&scene, 0.3, 0) == 0 && floor_radiance(&scene, 0.5, 0) > 0,
+             "shadow of a spot light", "the shadow of a plate half way up is twice as wide");
     pt_scene_free(&scene);
 }
 
@@ -165,18 +175,31 @@ static void spot_power(void)
             const double c = made ? dot3(s.w, axis) : 1, omc = (1 - c) / (1 - ce);
             const pt_vec3 local = pt_frame_to_local(&frame, made ? s.w : axis);
             pt_stats_add(&flux, made ? dbl(s.radiance.g) / (s.pdf_a * s.pdf_w) : 0);
-            off += made && (s.pdf_a != 1 || fabs(s.pdf_w - density) > 1e-6 * density || dot3(s.n, s.n) > 0 || s.cos_n != 1 || dbl(s.p.y) != 2);
-            if (k < 4) counts[cell(omc, 8) * 8 + cell(0.5 + atan2(dbl(local.y), dbl(local.x)) / (2 * PT_PI), 8)]++;
+            off += made && (s.pdf_a != 1 || fabs(s.pdf_w - density) > 1e-6 * density || dot3(s.n, s.n) > 0 ||
+                            s.cos_n != 1 || dbl(s.p.y) != 2);
+            if (k < 4)
+                counts[cell(omc, 8) * 8 + cell(0.5 + atan2(dbl(local.y), dbl(local.x)) / (2 * PT_PI), 8)]++;
         }
         for (i = 0; i < 64; i++) expected[i] = n / 64.0;
-        pt_check(off == 0, label("spot %g-%g degrees", rim[k][0], rim[k][1]), "%d of %u rays: density or origin", off, n);
-        if (k < 4) pt_check_chi2(label("directions of spot %g-%g", rim[k][0], rim[k][1]), counts, expected, 64, "rays must fill the cone uniformly");
+        pt_check(off == 0, label("spot %g-%g degrees", rim[k][0], rim[k][1]),
+                 "%d of %u rays: density or origin", off, n);
+        if (k < 4)
+            pt_check_chi2(label("directions of spot %g-%g", rim[k][0], rim[k][1]), counts, expected, 64,
+                          "rays must fill the cone uniformly");
         pt_check_mean(label("power of spot %g-%g", rim[k][0], rim[k][1]), &flux, pt_flux_spot(3, cs, ce),
-                      1e-5 * pt_flux_spot(3, cs, ce), 0.02, PT_TEST_VALUES, "intensity over density must be the flux of the falloff");
-        pt_light_pdf_le(&scene, 0, v3(0, 0, 0), pt_frame_to_world(&frame, v3(sin(degrees(0.9 * rim[k][1])), 0, cos(degrees(0.9 * rim[k][1])))), &pdf_a, &pdf_w);
-        pt_check(pdf_a == 1 && fabs(pdf_w / density - 1) < 1e-6, "density within the cone", "%g, not %g", pdf_w, density);
+                      1e-5 * pt_flux_spot(3, cs, ce), 0.02, PT_TEST_VALUES,
+                      "intensity over density must be the flux of the falloff");
+        pt_light_pdf_le(
+            &scene, 0, v3(0, 0, 0),
+            pt_frame_to_world(&frame, v3(sin(degrees(0.9 * rim[k][1])), 0, cos(degrees(0.9 * rim[k][1])))),
+            &pdf_a, &pdf_w);
+        pt_check(pdf_a == 1 && fabs(pdf_w / density - 1) < 1e-6, "density within the cone", "%g, not %g",
+                 pdf_w, density);
         if (k != 1) {
-            pt_light_pdf_le(&scene, 0, v3(0, 0, 0), pt_frame_to_world(&frame, v3(sin(degrees(1.1 * rim[k][1])), 0, cos(degrees(1.1 * rim[k][1])))), &pdf_a, &pdf_w);
+            pt_light_pdf_le(&scene, 0, v3(0, 0, 0),
+                            pt_frame_to_world(
+                                &frame, v3(sin(degrees(1.1 * rim[k][1])), 0, cos(degrees(1.1 * rim[k][1])))),
+                            &pdf_a, &pdf_w);
             pt_check(pdf_w == 0, "density beyond the cone", "%g, not 0", pdf_w);
         }
         pt_scene_free(&scene);
@@ -200,7 +223,9 @@ static void choice_of_new_lights(void)
     scene = committed(scene);
     pt_check(scene.light_count == 3, "three lights", "%u lights", (unsigned)scene.light_count);
     for (i = 0; i < scene.light_count; i++) {
-        kind = scene.lights[i].kind == PT_LIGHT_SPOT ? 0 : scene.lights[i].kind == PT_LIGHT_DIRECTIONAL ? 1 : 2;
+        kind = scene.lights[i].kind == PT_LIGHT_SPOT          ? 0
+               : scene.lights[i].kind == PT_LIGHT_DIRECTIONAL ? 1
+                                                              : 2;
         pt_check_near(label("share of light %d", kind), scene.lights[i].pmf, power[kind] / sum, 1e-5,
                       "pti_light_power: a spot's flux, pi r^2 E of a sun, 4 pi^2 r^2 mean L of a sky");
     }
@@ -249,7 +274,8 @@ static void sun_shadows(void)
         pt_scene scene = PT_SCENE_INIT;
         pt_pcg32 rng = pt_pcg32_make(20, (uint64_t)k);
         int wrong = 0, shaded = 0;
-        pt_add_parallelogram(&scene, v3(-1e3, 0, -1e3), v3(0, 0, 2e3), v3(2e3, 0, 0), pt_add_material(&scene, pt_material_diffuse(grey(0.5))));
+        pt_add_parallelogram(&scene, v3(-1e3, 0, -1e3), v3(0, 0, 2e3), v3(2e3, 0, 0),
+                             pt_add_material(&scene, pt_material_diffuse(grey(0.5))));
         pt_add_sphere(&scene, c, (pt_real)r, 0);
         pt_add_directional_light(&scene, w, grey(1));
         scene = committed(scene);
@@ -292,15 +318,19 @@ static void sun_power(void)
         pt_light_pdf_le(&scene, 0, s.n, s.w, &pdf_a, &pdf_w);
         q = pt_frame_to_local(&frame, pt_v3_sub(s.p, v3(2, 1, -3)));
         rho2 = (dbl(q.x) * dbl(q.x) + dbl(q.y) * dbl(q.y)) / (r * r);
-        off += !made || fabs(dbl(s.radiance.r) / (s.pdf_a * s.pdf_w) - 3 * PT_PI * r * r) > 1e-5 * 3 * PT_PI * r * r || rho2 > 1 + 1e-5 || fabs(dbl(q.z) + r) > 1e-4 ||
-               pdf_a != s.pdf_a || pdf_w != s.pdf_w || s.pdf_w != 1 || dot3(s.w, w) < 1 - 1e-6 || s.cos_n != 1;
+        off += !made ||
+               fabs(dbl(s.radiance.r) / (s.pdf_a * s.pdf_w) - 3 * PT_PI * r * r) > 1e-5 * 3 * PT_PI * r * r ||
+               rho2 > 1 + 1e-5 || fabs(dbl(q.z) + r) > 1e-4 || pdf_a != s.pdf_a || pdf_w != s.pdf_w ||
+               s.pdf_w != 1 || dot3(s.w, w) < 1 - 1e-6 || s.cos_n != 1;
         counts[cell(rho2, 8) * 8 + cell(0.5 + atan2(dbl(q.y), dbl(q.x)) / (2 * PT_PI), 8)]++;
     }
     for (i = 0; i < 64; i++) expected[i] = n / 64.0;
-    pt_check(off == 0, "rays of the sun", "%d of %u: E over density is E pi r^2, from a disk before the scene", off, n);
+    pt_check(off == 0, "rays of the sun",
+             "%d of %u: E over density is E pi r^2, from a disk before the scene", off, n);
     pt_check_chi2("starts of the sun's rays", counts, expected, 64, "must fill the disk uniformly");
     lit = pt_light_sample(&scene, 0, v3(9, 9, 9), pt_v2(0, 0), &ls);
-    pt_check(lit && ls.delta && ls.infinite && ls.pdf_w == 1 && dbl(ls.radiance.g) == 3 && dot3(ls.wi, w) < -1 + 1e-6 && dbl(ls.distance) > 10,
+    pt_check(lit && ls.delta && ls.infinite && ls.pdf_w == 1 && dbl(ls.radiance.g) == 3 &&
+                 dot3(ls.wi, w) < -1 + 1e-6 && dbl(ls.distance) > 10,
              "sample of the sun", "delta, infinitely far, irradiance across the direction");
     pt_check(pt_light_pdf_w(&scene, 0, v3(0, 0, 0), pt_v3_neg(w), NULL) == 0, "sun", "a ray cannot hit it");
     pt_scene_free(&scene);
@@ -351,7 +381,8 @@ static pt_scene under(const sky *s, double scale, int with_floor)
 {
     pt_scene scene = PT_SCENE_INIT;
     if (with_floor) add_floor(&scene);
-    pt_check(pt_set_environment_image(&scene, s->rgb, s->w, s->h, scale) == 0, "pt_set_environment_image", "%s", pt_scene_error(&scene));
+    pt_check(pt_set_environment_image(&scene, s->rgb, s->w, s->h, scale) == 0, "pt_set_environment_image",
+             "%s", pt_scene_error(&scene));
     return committed(scene);
 }
 
@@ -376,9 +407,11 @@ static void sky_orientation(void)
                     const pt_vec3 w = sky_direction(&s, x + (i & 1 ? 0.99 : 0.01), y + (i & 2 ? 0.99 : 0.01));
                     const pt_rgb got = pt_environment_radiance(&scene, w);
                     const float *const c = s.rgb + 3 * (y * s.w + x);
-                    wrong += fabs(dbl(got.r) - 2 * (double)c[0]) > 1e-6 || fabs(dbl(got.b) - 2 * (double)c[2]) > 1e-6;
+                    wrong += fabs(dbl(got.r) - 2 * (double)c[0]) > 1e-6 ||
+                             fabs(dbl(got.b) - 2 * (double)c[2]) > 1e-6;
                 }
-        pt_check(wrong == 0, label("pixels of a sky of %d x %d", s.w, s.h), "%d of %d directions see another pixel", wrong, 4 * s.w * s.h);
+        pt_check(wrong == 0, label("pixels of a sky of %d x %d", s.w, s.h),
+                 "%d of %d directions see another pixel", wrong, 4 * s.w * s.h);
         pt_scene_free(&scene);
         free(s.rgb);
     }
@@ -387,7 +420,8 @@ static void sky_orientation(void)
 /* The same in words, with an odd width: -z is in the middle column, +x a quarter to the right, +y in the top row. */
 static void sky_axes(void)
 {
-    static const double axis[8][3] = {{0, 0, -1}, {1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {-0.0, 0, 1}, {0, 1, -0.0}};
+    static const double axis[8][3] = {{0, 0, -1}, {1, 0, 0}, {-1, 0, 0},   {0, 1, 0},
+                                      {0, -1, 0}, {0, 0, 1}, {-0.0, 0, 1}, {0, 1, -0.0}};
     static const int column[8] = {4, 6, 2, -1, -1, 0, 0, -1}, row[8] = {1, 1, 1, 0, 2, 1, 1, 0};
     sky s = sky_make(9, 3, 1);
     pt_scene scene = under(&s, 1, 0);
@@ -398,9 +432,11 @@ static void sky_axes(void)
         for (x = 0; x < 9; x++) {
             const float *const c = s.rgb + 3 * (row[k] * 9 + x);
             if (fabs(dbl(got.g) - (double)c[1]) < 1e-6 && fabs(dbl(got.b) - (double)c[2]) < 1e-6)
-                found |= column[k] < 0 || x == column[k] || (k >= 5 && x == 8); /* +z is the seam: first or last column */
+                found |= column[k] < 0 || x == column[k] ||
+                         (k >= 5 && x == 8); /* +z is the seam: first or last column */
         }
-        pt_check(found, label("sky along (%g, %g, %g)", axis[k][0], axis[k][1], axis[k][2]), "sees the wrong pixel: %g", dbl(got.g));
+        pt_check(found, label("sky along (%g, %g, %g)", axis[k][0], axis[k][1], axis[k][2]),
+                 "sees the wrong pixel: %g", dbl(got.g));
     }
     pt_scene_free(&scene);
     free(s.rgb);
@@ -421,7 +457,8 @@ static void sky_picture(void)
     for (y = 0; y < 2 && film.half[0]; y++)
         for (x = 0; x < 2; x++)
             wrong += fabs(pt_film_pixel(&film, x, y).b - (double)s.rgb[3 * (y * 4 + 1 + x) + 2]) > 1e-6;
-    pt_check(wrong == 0, "picture of a sky", "%d of 4 quadrants are wrong: the columns to the right of -z are to the right", wrong);
+    pt_check(wrong == 0, "picture of a sky",
+             "%d of 4 quadrants are wrong: the columns to the right of -z are to the right", wrong);
     pt_film_free(&film);
     pt_scene_free(&scene);
     free(s.rgb);
@@ -437,11 +474,13 @@ static void check_sky_density(const sky *s, const pt_scene *scene)
     for (y = 0; y < s->h; y++)
         for (x = 0; x < s->w; x++) {
             const pt_vec3 w = sky_direction(s, x + 0.5, y + 0.5);
-            const double p = pt_light_pdf_w(scene, scene->environment_light, v3(1, 2, 3), w, NULL), exact = pixel_luminance(s, x, y) / total;
+            const double p = pt_light_pdf_w(scene, scene->environment_light, v3(1, 2, 3), w, NULL),
+                         exact = pixel_luminance(s, x, y) / total;
             integral += p * pixel_solid_angle(s, y);
             worst = fmax(worst, fabs(p - exact) / fmax(exact, 1 / (4 * PT_PI)));
         }
-    pt_check_near(label("density of a sky of %d x %d", s->w, s->h), integral, 1, 1e-9, "must integrate to 1 over the sphere");
+    pt_check_near(label("density of a sky of %d x %d", s->w, s->h), integral, 1, 1e-9,
+                  "must integrate to 1 over the sphere");
     pt_check(worst <= 1e-8, label("density of a sky of %d x %d by hand", s->w, s->h),
              "off by %.3g: luminance over the sum of luminance times solid angle", worst);
 }
@@ -450,7 +489,8 @@ static void check_sky_density(const sky *s, const pt_scene *scene)
    the radiance and density that a lookup gives. */
 static void check_sky_samples(const sky *s, const pt_scene *scene, uint64_t seed, uint32_t n)
 {
-    const int bx = s->w > 16 ? 16 : s->w, by = s->h > 8 ? 8 : s->h, parts = s->w * s->h <= 2 ? 4 : 1, cells = bx * by * parts * parts;
+    const int bx = s->w > 16 ? 16 : s->w, by = s->h > 8 ? 8 : s->h, parts = s->w * s->h <= 2 ? 4 : 1,
+              cells = bx * by * parts * parts;
     pt_pcg32 rng = generator(seed);
     double counts[1024] = {0}, expected[1024] = {0}, total = 0;
     int i, x, y, off = 0;
@@ -458,7 +498,8 @@ static void check_sky_samples(const sky *s, const pt_scene *scene, uint64_t seed
         for (x = 0; x < s->w; x++) {
             const double p = pixel_luminance(s, x, y) * pixel_solid_angle(s, y);
             total += p;
-            for (i = 0; i < parts * parts; i++) expected[((y * by / s->h) * bx + x * bx / s->w) * parts * parts + i] += p / (parts * parts);
+            for (i = 0; i < parts * parts; i++)
+                expected[((y * by / s->h) * bx + x * bx / s->w) * parts * parts + i] += p / (parts * parts);
         }
     n = pt_test_samples(n);
     for (i = 0; i < cells; i++) expected[i] *= n / total;
@@ -468,22 +509,29 @@ static void check_sky_samples(const sky *s, const pt_scene *scene, uint64_t seed
         pt_rgb seen;
         if (!pt_light_sample(scene, scene->environment_light, v3(1, 2, 3), pair(&rng), &l)) continue;
         seen = pt_environment_radiance(scene, l.wi);
-        off += dbl(seen.g) != dbl(l.radiance.g) || l.pdf_w != pt_light_pdf_w(scene, scene->environment_light, v3(1, 2, 3), l.wi, NULL) || l.delta || !l.infinite || !(l.pdf_w > 0);
+        off += dbl(seen.g) != dbl(l.radiance.g) ||
+               l.pdf_w != pt_light_pdf_w(scene, scene->environment_light, v3(1, 2, 3), l.wi, NULL) ||
+               l.delta || !l.infinite || !(l.pdf_w > 0);
         phi = s->w * (0.5 + atan2(dbl(l.wi.x), -dbl(l.wi.z)) / (2 * PT_PI));
         up = s->h * atan2(sqrt(dbl(l.wi.x) * dbl(l.wi.x) + dbl(l.wi.z) * dbl(l.wi.z)), dbl(l.wi.y)) / PT_PI;
         x = phi >= s->w ? s->w - 1 : (int)phi;
         y = up >= s->h ? s->h - 1 : (int)up;
         a = cos(PT_PI * y / s->h); /* uniform in solid angle: in azimuth and in the cosine */
         b = cos(PT_PI * (y + 1) / s->h);
-        counts[((y * by / s->h) * bx + x * bx / s->w) * parts * parts + cell(phi - x, parts) * parts + cell((a - dbl(l.wi.y)) / (a - b), parts)]++;
+        counts[((y * by / s->h) * bx + x * bx / s->w) * parts * parts + cell(phi - x, parts) * parts +
+               cell((a - dbl(l.wi.y)) / (a - b), parts)]++;
     }
-    pt_check(off == 0, label("samples of a sky of %d x %d", s->w, s->h), "%d of %u: radiance or density is not that of the direction", off, n);
-    if (cells > 1) pt_check_chi2(label("directions of a sky of %d x %d", s->w, s->h), counts, expected, cells, "do not follow the density");
+    pt_check(off == 0, label("samples of a sky of %d x %d", s->w, s->h),
+             "%d of %u: radiance or density is not that of the direction", off, n);
+    if (cells > 1)
+        pt_check_chi2(label("directions of a sky of %d x %d", s->w, s->h), counts, expected, cells,
+                      "do not follow the density");
 }
 
 static void sky_sampling(void)
 {
-    static const int size[7][3] = {{1, 1, 0}, {2, 1, 1}, {5, 3, 1}, {7, 6, 3}, {64, 32, 2}, {512, 256, 1}, {512, 256, 3}};
+    static const int size[7][3] = {{1, 1, 0},   {2, 1, 1},     {5, 3, 1},    {7, 6, 3},
+                                   {64, 32, 2}, {512, 256, 1}, {512, 256, 3}};
     int k;
     for (k = 0; k < 7; k++) {
         sky s = sky_make(size[k][0], size[k][1], size[k][2]);
@@ -508,13 +556,17 @@ static void sky_hot_pixel(void)
         pt_light_sample_result l;
         pt_light_emission_result e;
         made = pt_light_sample(&scene, scene.environment_light, v3(0, 0, 0), pair(&rng), &l);
-        if (!made || dbl(l.radiance.r) <= 0) outside++; /* rounding to float may step over an edge */
-        else count += fabs(l.pdf_w * omega - 1) > 1e-9;
+        if (!made || dbl(l.radiance.r) <= 0)
+            outside++; /* rounding to float may step over an edge */
+        else
+            count += fabs(l.pdf_w * omega - 1) > 1e-9;
         made = pt_light_sample_le(&scene, scene.environment_light, pair(&rng), pair(&rng), 0, &e);
         pt_stats_add(&power, made ? dbl(e.radiance.r) / (e.pdf_a * e.pdf_w) : 0);
     }
-    pt_check(outside <= 2 && count == 0, "a hot pixel", "%d of 2000 samples miss it, %d have another density than 1 / %g sr", outside, count, omega);
-    pt_check_mean("power of a hot pixel", &power, PT_PI * 100 * omega, 1e-3 * PT_PI * 100 * omega, 0.02, PT_TEST_VALUES, "an empty scene has radius 1: pi r^2 times L times solid angle");
+    pt_check(outside <= 2 && count == 0, "a hot pixel",
+             "%d of 2000 samples miss it, %d have another density than 1 / %g sr", outside, count, omega);
+    pt_check_mean("power of a hot pixel", &power, PT_PI * 100 * omega, 1e-3 * PT_PI * 100 * omega, 0.02,
+                  PT_TEST_VALUES, "an empty scene has radius 1: pi r^2 times L times solid angle");
     pt_scene_free(&scene);
     free(s.rgb);
 }
@@ -527,13 +579,17 @@ static void sky_mean(void)
     double sum = 0;
     int x, y;
     for (y = 0; y < s.h; y++)
-        for (x = 0; x < s.w; x++) sum += 2 * (double)s.rgb[3 * (y * s.w + x)] * pixel_solid_angle(&s, y) / (4 * PT_PI);
-    pt_check_near("mean radiance of a sky", dbl(scene.environment.r), sum, 8 * unit_roundoff() * sum, "weigh pixels by solid angle");
+        for (x = 0; x < s.w; x++)
+            sum += 2 * (double)s.rgb[3 * (y * s.w + x)] * pixel_solid_angle(&s, y) / (4 * PT_PI);
+    pt_check_near("mean radiance of a sky", dbl(scene.environment.r), sum, 8 * unit_roundoff() * sum,
+                  "weigh pixels by solid angle");
     pt_check_near("mean radiance of a constant image", dbl(constant.environment.b), 3, 1e-6, "");
-    pt_check(pt_scene_needs(&scene) == (PT_NEEDS_ENVIRONMENT | PT_NEEDS_ENVIRONMENT_IMAGE), "needs of a sky", "%x", pt_scene_needs(&scene));
+    pt_check(pt_scene_needs(&scene) == (PT_NEEDS_ENVIRONMENT | PT_NEEDS_ENVIRONMENT_IMAGE), "needs of a sky",
+             "%x", pt_scene_needs(&scene));
     pt_set_environment(&constant, grey(4));
     constant = committed(constant);
-    pt_check(dbl(pt_environment_radiance(&constant, v3(0, 1, 0)).r) == 4 && pt_scene_needs(&constant) == PT_NEEDS_ENVIRONMENT,
+    pt_check(dbl(pt_environment_radiance(&constant, v3(0, 1, 0)).r) == 4 &&
+                 pt_scene_needs(&constant) == PT_NEEDS_ENVIRONMENT,
              "a constant after an image", "the image must be gone");
     pt_scene_free(&scene);
     pt_scene_free(&constant);
@@ -549,17 +605,23 @@ static void sky_irradiance_by_hand(const sky *s, double *on_floor, double *on_wa
     *on_floor = *on_wall = 0;
     for (y = 0; y < s->h; y++)
         for (x = 0; x < s->w; x++) {
-            const double a = PT_PI * y / s->h, b = PT_PI * (y + 1) / s->h, c = 2 * PT_PI * ((double)x / s->w - 0.5), d = c + 2 * PT_PI / s->w;
+            const double a = PT_PI * y / s->h, b = PT_PI * (y + 1) / s->h,
+                         c = 2 * PT_PI * ((double)x / s->w - 0.5), d = c + 2 * PT_PI / s->w;
             const double value = (double)s->rgb[3 * (y * s->w + x)];
             if (2 * (y + 1) <= s->h) *on_floor += value * (d - c) * 0.5 * (sin(b) * sin(b) - sin(a) * sin(a));
-            if (2 * x >= s->w) *on_wall += value * (cos(c) - cos(d)) * 0.5 * (b - a - sin(b) * cos(b) + sin(a) * cos(a));
+            if (2 * x >= s->w)
+                *on_wall += value * (cos(c) - cos(d)) * 0.5 * (b - a - sin(b) * cos(b) + sin(a) * cos(a));
         }
 }
 
 /* One surface that sees half of the sky: rho / pi E by each of the three estimators. */
 static void sky_irradiance(void)
 {
-    static const struct { const char *name; pt_li_fn li; uint32_t n; } method[3] = {
+    static const struct {
+        const char *name;
+        pt_li_fn li;
+        uint32_t n;
+    } method[3] = {
         {"path", pt_li_path, 60000}, {"light", pt_li_path_light, 320000}, {"plain", pt_li_path_plain, 60000}};
     sky s = sky_make(16, 8, 1);
     double exact[2];
@@ -568,8 +630,10 @@ static void sky_irradiance(void)
     for (wall = 0; wall < 2; wall++) {
         pt_scene scene = PT_SCENE_INIT;
         const int white = pt_add_material(&scene, pt_material_diffuse(grey(0.5)));
-        if (wall) pt_add_parallelogram(&scene, v3(0, -5, -5), v3(0, 10, 0), v3(0, 0, 10), white); /* faces +x */
-        else pt_add_parallelogram(&scene, v3(-5, 0, -5), v3(0, 0, 10), v3(10, 0, 0), white);
+        if (wall)
+            pt_add_parallelogram(&scene, v3(0, -5, -5), v3(0, 10, 0), v3(0, 0, 10), white); /* faces +x */
+        else
+            pt_add_parallelogram(&scene, v3(-5, 0, -5), v3(0, 0, 10), v3(10, 0, 0), white);
         pt_set_environment_image(&scene, s.rgb, s.w, s.h, 1);
         scene = committed(scene);
         for (m = 0; m < 3; m++) {
@@ -577,9 +641,12 @@ static void sky_irradiance(void)
             const pt_vec3 o = wall ? v3(0.01, 0, 0) : v3(0, 0.01, 0), d = wall ? v3(-1, 0, 0) : v3(0, -1, 0);
             pt_stats stats = PT_STATS_INIT;
             uint32_t i;
-            for (i = 0; i < n; i++) pt_stats_add(&stats, direct_light(&scene, method[m].li, o, d, 60 + (uint64_t)(3 * wall + m), i).r);
-            pt_check_mean(label("%s under a gradient sky, %s", wall ? "wall" : "floor", method[m].name), &stats, 0.5 / PT_PI * exact[wall],
-                          1e-6, 0.02, PT_TEST_VALUES, "a flipped or mirrored picture, a missing sin theta, or a density per pixel");
+            for (i = 0; i < n; i++)
+                pt_stats_add(&stats,
+                             direct_light(&scene, method[m].li, o, d, 60 + (uint64_t)(3 * wall + m), i).r);
+            pt_check_mean(label("%s under a gradient sky, %s", wall ? "wall" : "floor", method[m].name),
+                          &stats, 0.5 / PT_PI * exact[wall], 1e-6, 0.02, PT_TEST_VALUES,
+                          "a flipped or mirrored picture, a missing sin theta, or a density per pixel");
         }
         pt_scene_free(&scene);
     }
@@ -599,7 +666,10 @@ static void sky_constant(void)
     pt_set_environment(&constant, grey(2));
     constant = committed(constant);
     for (i = 0; i < n; i++) {
-        if (i < 1000) worst = fmax(worst, fabs(direct_light(&image, pt_li_path_plain, v3(0, 0.01, 0), v3(0, -1, 0), 70, i).g - 1));
+        if (i < 1000)
+            worst =
+                fmax(worst,
+                     fabs(direct_light(&image, pt_li_path_plain, v3(0, 0.01, 0), v3(0, -1, 0), 70, i).g - 1));
         pt_stats_add(&a, direct_light(&image, pt_li_path, v3(0, 0.01, 0), v3(0, -1, 0), 71, i).g);
         pt_stats_add(&b, direct_light(&constant, pt_li_path, v3(0, 0.01, 0), v3(0, -1, 0), 72, i).g);
     }
@@ -620,7 +690,8 @@ static void sky_black(void)
     add_floor(&scene);
     pt_set_environment_image(&scene, black, 2, 2, 1);
     scene = committed(scene);
-    pt_check(scene.light_count == 0 && scene.environment_light == -1 && direct_light(&scene, pt_li_path, v3(0, 1, 0), v3(0, -1, 0), 73, 0).r == 0,
+    pt_check(scene.light_count == 0 && scene.environment_light == -1 &&
+                 direct_light(&scene, pt_li_path, v3(0, 1, 0), v3(0, -1, 0), 73, 0).r == 0,
              "a black sky", "is a light");
     pt_scene_free(&scene);
 }
@@ -636,13 +707,19 @@ static void units(void)
     const pt_rgbd w = pt_watts_from_lumens(815, warm), none = pt_watts_from_lumens(815, grey(0));
     pt_check_near("candela of a lamp of 815 lm", pt_intensity_of_flux(815), 64.86, 0.005, "flux / (4 pi)");
     pt_check_near("flux of that lamp", pt_flux_point(pt_intensity_of_flux(815)), 815, 1e-11, "the inverse");
-    pt_check_near("lumens of the watts of a lamp", PT_LUMENS_PER_WATT * pt_luminance(w.r, w.g, w.b), 815, 1e-10, "683.002 lm/W times luminance");
-    pt_check_near("colour of the watts of a lamp", w.g / w.r, dbl(warm.g) / dbl(warm.r), 1e-12, "keeps the ratios of the bands");
-    pt_check_near("watts of a white lamp", pt_watts_from_lumens(683.002, grey(1)).b, 1, 1e-9, "1 W at luminance 1 is 683.002 lm");
+    pt_check_near("lumens of the watts of a lamp", PT_LUMENS_PER_WATT * pt_luminance(w.r, w.g, w.b), 815,
+                  1e-10, "683.002 lm/W times luminance");
+    pt_check_near("colour of the watts of a lamp", w.g / w.r, dbl(warm.g) / dbl(warm.r), 1e-12,
+                  "keeps the ratios of the bands");
+    pt_check_near("watts of a white lamp", pt_watts_from_lumens(683.002, grey(1)).b, 1, 1e-9,
+                  "1 W at luminance 1 is 683.002 lm");
     pt_check(none.r == 0 && none.g == 0 && none.b == 0, "watts of a black lamp", "are not 0");
-    pt_check_near("radiance of a panel of 3000 lm, 0.36 m^2", pt_radiance_of_flux(3000, 0.36), 3000 / (PT_PI * 0.36), 1e-9, "Phi / (pi A)");
-    pt_check_near("field of view of the Cornell box", pt_vfov_deg_of_film(0.025, 0.035), 39.30765, 5e-6, "2 atan(h / 2f)");
-    pt_check_near("field of view of a film as high as 2 f", pt_vfov_deg_of_film(2, 1), 90, 1e-12, "2 atan(1)");
+    pt_check_near("radiance of a panel of 3000 lm, 0.36 m^2", pt_radiance_of_flux(3000, 0.36),
+                  3000 / (PT_PI * 0.36), 1e-9, "Phi / (pi A)");
+    pt_check_near("field of view of the Cornell box", pt_vfov_deg_of_film(0.025, 0.035), 39.30765, 5e-6,
+                  "2 atan(h / 2f)");
+    pt_check_near("field of view of a film as high as 2 f", pt_vfov_deg_of_film(2, 1), 90, 1e-12,
+                  "2 atan(1)");
 }
 
 /* ---- bad input -------------------------------------------------------------------------------------- */
@@ -651,21 +728,23 @@ static void check_refused(const char *name, pt_scene *scene, int id, const char 
 {
     const char *const text = pt_scene_error(scene);
     const pt_result result = pt_commit(scene);
-    pt_check(id == -1 && result != PT_OK && strstr(text, item) && strstr(text, what), name, "id %d, result '%s', sentence '%s'", id,
-             pt_result_string(result), text);
+    pt_check(id == -1 && result != PT_OK && strstr(text, item) && strstr(text, what), name,
+             "id %d, result '%s', sentence '%s'", id, pt_result_string(result), text);
     pt_scene_free(scene);
 }
 
 static void bad_spots_and_suns(void)
 {
     static const double bad[3] = {(double)NAN, HUGE_VAL, -1};
-    static const double angles[7][2] = {{-1, 20}, {20, 20}, {30, 20}, {20, 181}, {(double)NAN, 20}, {20, (double)NAN}, {190, 200}};
+    static const double angles[7][2] = {{-1, 20},          {20, 20},          {30, 20},  {20, 181},
+                                        {(double)NAN, 20}, {20, (double)NAN}, {190, 200}};
     int k, i;
     for (i = 0; i < 7; i++) {
         pt_scene s = PT_SCENE_INIT;
         pt_add_point_light(&s, v3(0, 0, 0), grey(1));
         check_refused(label("spot of %g to %g degrees", angles[i][0], angles[i][1]), &s,
-                      pt_add_spot_light(&s, v3(0, 0, 0), v3(0, 1, 0), grey(1), angles[i][0], angles[i][1]), "spot light 1", "angles");
+                      pt_add_spot_light(&s, v3(0, 0, 0), v3(0, 1, 0), grey(1), angles[i][0], angles[i][1]),
+                      "spot light 1", "angles");
     }
     for (k = 0; k < 2; k++) {
         static const char *const item[2] = {"spot light 0", "directional light 0"};
@@ -673,31 +752,49 @@ static void bad_spots_and_suns(void)
             const pt_rgb light = pt_rgb3(1, 1, (pt_real)bad[i]);
             pt_scene s = PT_SCENE_INIT;
             check_refused(label("%s of intensity %g", item[k], bad[i]), &s,
-                          k ? pt_add_directional_light(&s, v3(0, 1, 0), light) : pt_add_spot_light(&s, v3(0, 0, 0), v3(0, 1, 0), light, 10, 20), item[k], "intensity");
+                          k ? pt_add_directional_light(&s, v3(0, 1, 0), light)
+                            : pt_add_spot_light(&s, v3(0, 0, 0), v3(0, 1, 0), light, 10, 20),
+                          item[k], "intensity");
             if (i == 2) continue; /* -1 is a coordinate */
             check_refused(label("%s along %g", item[k], bad[i]), &s,
-                          k ? pt_add_directional_light(&s, v3(0, bad[i], 0), grey(1)) : pt_add_spot_light(&s, v3(0, 0, 0), v3(0, bad[i], 0), grey(1), 10, 20), item[k], "");
+                          k ? pt_add_directional_light(&s, v3(0, bad[i], 0), grey(1))
+                            : pt_add_spot_light(&s, v3(0, 0, 0), v3(0, bad[i], 0), grey(1), 10, 20),
+                          item[k], "");
         }
         {
             pt_scene s = PT_SCENE_INIT;
             check_refused(label("%s along nothing", item[k]), &s,
-                          k ? pt_add_directional_light(&s, v3(0, 0, 0), grey(1)) : pt_add_spot_light(&s, v3(0, 0, 0), v3(0, 0, 0), grey(1), 10, 20), item[k], "direction is zero");
+                          k ? pt_add_directional_light(&s, v3(0, 0, 0), grey(1))
+                            : pt_add_spot_light(&s, v3(0, 0, 0), v3(0, 0, 0), grey(1), 10, 20),
+                          item[k], "direction is zero");
         }
     }
     {
         pt_scene s = PT_SCENE_INIT;
-        check_refused("spot at infinity", &s, pt_add_spot_light(&s, v3(HUGE_VAL, 0, 0), v3(0, 1, 0), grey(1), 10, 20), "spot light 0", "");
+        check_refused("spot at infinity", &s,
+                      pt_add_spot_light(&s, v3(HUGE_VAL, 0, 0), v3(0, 1, 0), grey(1), 10, 20), "spot light 0",
+                      "");
     }
 }
 
 #if PTI_HAS_ENVIRONMENT
 static void bad_skies(void)
 {
-    static const struct { const char *name; int null, w, h; double pixel, scale; const char *what; } bad[] = {
-        {"no image", 1, 2, 2, 1, 1, "empty"},        {"image of no width", 0, 0, 2, 1, 1, "empty"},     {"image of negative height", 0, 2, -2, 1, 1, "empty"},
-        {"image too wide", 0, 65537, 1, 1, 1, "larger"}, {"NaN in an image", 0, 2, 2, (double)NAN, 1, "pixel"}, {"infinity in an image", 0, 2, 2, HUGE_VAL, 1, "pixel"},
-        {"negative pixel", 0, 2, 2, -0.5, 1, "pixel"}, {"negative scale", 0, 2, 2, 1, -1, "scale"},      {"scale NaN", 0, 2, 2, 1, (double)NAN, "scale"},
-        {"scale infinite", 0, 2, 2, 1, HUGE_VAL, "scale"}};
+    static const struct {
+        const char *name;
+        int null, w, h;
+        double pixel, scale;
+        const char *what;
+    } bad[] = {{"no image", 1, 2, 2, 1, 1, "empty"},
+               {"image of no width", 0, 0, 2, 1, 1, "empty"},
+               {"image of negative height", 0, 2, -2, 1, 1, "empty"},
+               {"image too wide", 0, 65537, 1, 1, 1, "larger"},
+               {"NaN in an image", 0, 2, 2, (double)NAN, 1, "pixel"},
+               {"infinity in an image", 0, 2, 2, HUGE_VAL, 1, "pixel"},
+               {"negative pixel", 0, 2, 2, -0.5, 1, "pixel"},
+               {"negative scale", 0, 2, 2, 1, -1, "scale"},
+               {"scale NaN", 0, 2, 2, 1, (double)NAN, "scale"},
+               {"scale infinite", 0, 2, 2, 1, HUGE_VAL, "scale"}};
     size_t i;
     for (i = 0; i < sizeof bad / sizeof bad[0]; i++) {
         float rgb[12];
@@ -705,7 +802,10 @@ static void bad_skies(void)
         int k;
         for (k = 0; k < 12; k++) rgb[k] = 1;
         rgb[7] = (float)bad[i].pixel;
-        check_refused(bad[i].name, &s, pt_set_environment_image(&s, bad[i].null ? NULL : rgb, bad[i].w, bad[i].h, bad[i].scale), "environment", bad[i].what);
+        check_refused(
+            bad[i].name, &s,
+            pt_set_environment_image(&s, bad[i].null ? NULL : rgb, bad[i].w, bad[i].h, bad[i].scale),
+            "environment", bad[i].what);
     }
 }
 
@@ -717,7 +817,8 @@ static void sky_overflow(void)
     pt_light_sample_result l;
     int ok = pt_set_environment_image(&s, bright, 2, 1, 1e3) == -1;
     if (!ok && pt_commit(&s) == PT_OK)
-        ok = pt_light_sample(&s, 0, v3(0, 0, 0), pt_v2((pt_real)0.3, (pt_real)0.3), &l) && l.pdf_w > 0 && l.pdf_w < HUGE_VAL && dbl(l.radiance.r) < HUGE_VAL;
+        ok = pt_light_sample(&s, 0, v3(0, 0, 0), pt_v2((pt_real)0.3, (pt_real)0.3), &l) && l.pdf_w > 0 &&
+             l.pdf_w < HUGE_VAL && dbl(l.radiance.r) < HUGE_VAL;
     pt_check(ok, "sky of 3e38 times 1000", "is accepted, and its radiance is not finite");
     pt_scene_free(&s);
 }
@@ -738,7 +839,8 @@ static double filter_cdf(int filter, double x)
     if (filter == PT_FILTER_BOX) return 0.5 + 0.5 * x;
     if (filter == PT_FILTER_TENT) return x < 0 ? 0.5 * (1 + x) * (1 + x) : 1 - 0.5 * (1 - x) * (1 - x);
     for (i = 0; i < 2000; i++) { /* with x = -cos t the integrand is smooth at both ends */
-        const double t = PT_PI * (i + 0.5) / 2000, s = -3 * cos(t), p = exp(-0.5 * s * s) * erf(sqrt(fmax(0, 9 - s * s)) / sqrt(2)) * sin(t);
+        const double t = PT_PI * (i + 0.5) / 2000, s = -3 * cos(t),
+                     p = exp(-0.5 * s * s) * erf(sqrt(fmax(0, 9 - s * s)) / sqrt(2)) * sin(t);
         all += p;
         if (s < 3 * x) sum += p;
     }
@@ -750,7 +852,9 @@ static double filter_cdf(int filter, double x)
 static double filter_variance(int filter)
 {
     const double c = 4.5;
-    return filter == PT_FILTER_BOX ? 1.0 / 3 : filter == PT_FILTER_TENT ? 1.0 / 6 : (1 - c * exp(-c) / (1 - exp(-c))) / 9;
+    return filter == PT_FILTER_BOX    ? 1.0 / 3
+           : filter == PT_FILTER_TENT ? 1.0 / 6
+                                      : (1 - c * exp(-c) / (1 - exp(-c))) / 9;
 }
 
 static void filter_moments(void)
@@ -777,14 +881,22 @@ static void filter_moments(void)
                 counts[1][cell(0.5 + 0.5 * y, 32)]++;
                 most = fmax(most, f == PT_FILTER_GAUSSIAN ? sqrt(x * x + y * y) : fmax(fabs(x), fabs(y)));
             }
-            for (i = 0; i < 32; i++) expected[i] = n * (filter_cdf(f, (i + 1) / 16.0 - 1) - filter_cdf(f, i / 16.0 - 1));
-            pt_check(most <= 1 + 4 * unit_roundoff() && most > 0.97, label("%s filter of radius %g", FILTER[f], radius), "reaches %g radii", most);
-            pt_check_mean(label("%s filter %g, mean", FILTER[f], radius), &mean, 0, 1e-6, 0.02, PT_TEST_VALUES, "symmetric");
-            pt_check_mean(label("%s filter %g, x x", FILTER[f], radius), &square[0], filter_variance(f), 1e-6, 0.05, PT_TEST_VALUES, "variance of the filter");
-            pt_check_mean(label("%s filter %g, y y", FILTER[f], radius), &square[1], filter_variance(f), 1e-6, 0.05, PT_TEST_VALUES, "variance of the filter");
-            pt_check_mean(label("%s filter %g, x y", FILTER[f], radius), &product, 0, 1e-6, 0.02, PT_TEST_VALUES, "x and y are not correlated");
-            pt_check_chi2(label("%s filter %g, density in x", FILTER[f], radius), counts[0], expected, 32, "not proportional to the filter");
-            pt_check_chi2(label("%s filter %g, density in y", FILTER[f], radius), counts[1], expected, 32, "not proportional to the filter");
+            for (i = 0; i < 32; i++)
+                expected[i] = n * (filter_cdf(f, (i + 1) / 16.0 - 1) - filter_cdf(f, i / 16.0 - 1));
+            pt_check(most <= 1 + 4 * unit_roundoff() && most > 0.97,
+                     label("%s filter of radius %g", FILTER[f], radius), "reaches %g radii", most);
+            pt_check_mean(label("%s filter %g, mean", FILTER[f], radius), &mean, 0, 1e-6, 0.02,
+                          PT_TEST_VALUES, "symmetric");
+            pt_check_mean(label("%s filter %g, x x", FILTER[f], radius), &square[0], filter_variance(f), 1e-6,
+                          0.05, PT_TEST_VALUES, "variance of the filter");
+            pt_check_mean(label("%s filter %g, y y", FILTER[f], radius), &square[1], filter_variance(f), 1e-6,
+                          0.05, PT_TEST_VALUES, "variance of the filter");
+            pt_check_mean(label("%s filter %g, x y", FILTER[f], radius), &product, 0, 1e-6, 0.02,
+                          PT_TEST_VALUES, "x and y are not correlated");
+            pt_check_chi2(label("%s filter %g, density in x", FILTER[f], radius), counts[0], expected, 32,
+                          "not proportional to the filter");
+            pt_check_chi2(label("%s filter %g, density in y", FILTER[f], radius), counts[1], expected, 32,
+                          "not proportional to the filter");
         }
 }
 
@@ -804,7 +916,8 @@ static pt_rgb edge(void *user, pt_vec2 uv, pt_vec3 p)
 }
 
 /* A picture of 12 x 64 pixels of the wall z = -1: column x covers the wall from (x - 6) / 6 to (x - 5) / 6. */
-static void picture_of(pt_rgb (*albedo)(void *, pt_vec2, pt_vec3), int filter, double radius, uint64_t seed, pt_film *film)
+static void picture_of(pt_rgb (*albedo)(void *, pt_vec2, pt_vec3), int filter, double radius, uint64_t seed,
+                       pt_film *film)
 {
     pt_scene scene = PT_SCENE_INIT;
     pt_material wall = pt_material_diffuse(grey(1));
@@ -817,7 +930,8 @@ static void picture_of(pt_rgb (*albedo)(void *, pt_vec2, pt_vec3), int filter, d
     pt_add_parallelogram(&scene, v3(-2, -20, -1), v3(4, 0, 0), v3(0, 40, 0), pt_add_material(&scene, wall));
     pt_add_directional_light(&scene, v3(0, 0, -1), grey(PT_PI));
     scene = committed(scene);
-    d.camera = pt_camera_look_at(v3(0, 0, 0), v3(0, 0, -1), v3(0, 1, 0), (pt_real)(2 * atan(64.0 / 12) * 180 / PT_PI));
+    d.camera = pt_camera_look_at(v3(0, 0, 0), v3(0, 0, -1), v3(0, 1, 0),
+                                 (pt_real)(2 * atan(64.0 / 12) * 180 / PT_PI));
     d.width = 12;
     d.height = 64;
     d.spp = 64;
@@ -842,7 +956,8 @@ static pt_stats column_of(const pt_film *film, int x)
 static void filtered_pictures(void)
 {
     static const double radius[5] = {0.5, 1, 1.5, 2, 3};
-    static const int filter[5] = {PT_FILTER_BOX, PT_FILTER_TENT, PT_FILTER_GAUSSIAN, PT_FILTER_BOX, PT_FILTER_GAUSSIAN};
+    static const int filter[5] = {PT_FILTER_BOX, PT_FILTER_TENT, PT_FILTER_GAUSSIAN, PT_FILTER_BOX,
+                                  PT_FILTER_GAUSSIAN};
     int k, x, y;
     for (k = 0; k < 5; k++) {
         const double given = k < 3 ? 0 : radius[k];
@@ -851,8 +966,9 @@ static void filtered_pictures(void)
         picture_of(ramp, filter[k], given, 100 + (uint64_t)k, &film);
         for (x = 0; x < 12; x++) {
             const pt_stats s = column_of(&film, x);
-            pt_check_mean(label("ramp, %s %g, column %d", FILTER[filter[k]], radius[k], x), &s, 0.5 + 0.25 * (x - 5.5) / 6, 1e-6, 0.02,
-                          PT_TEST_MEANS, "the filter must be symmetric about the centre of the pixel");
+            pt_check_mean(label("ramp, %s %g, column %d", FILTER[filter[k]], radius[k], x), &s,
+                          0.5 + 0.25 * (x - 5.5) / 6, 1e-6, 0.02, PT_TEST_MEANS,
+                          "the filter must be symmetric about the centre of the pixel");
         }
         pt_film_free(&film);
         picture_of(edge, filter[k], given, 110 + (uint64_t)k, &film);
@@ -860,16 +976,20 @@ static void filtered_pictures(void)
             const double exact = filter_cdf(filter[k], (x - 5.5) / radius[k]);
             const pt_stats s = column_of(&film, x);
             if (exact > 1e-9 && exact < 1 - 1e-9)
-                pt_check_mean(label("edge, %s %g, column %d", FILTER[filter[k]], radius[k], x), &s, exact, 1e-3, 0, PT_TEST_MEANS, "profile of an edge: the filter's integral");
+                pt_check_mean(label("edge, %s %g, column %d", FILTER[filter[k]], radius[k], x), &s, exact,
+                              1e-3, 0, PT_TEST_MEANS, "profile of an edge: the filter's integral");
             else
-                pt_check(fabs(s.mean - exact) < 1e-6, label("edge, %s %g, column %d", FILTER[filter[k]], radius[k], x), "%g beyond the filter's reach", s.mean);
+                pt_check(fabs(s.mean - exact) < 1e-6,
+                         label("edge, %s %g, column %d", FILTER[filter[k]], radius[k], x),
+                         "%g beyond the filter's reach", s.mean);
         }
         for (y = 0; y < 64; y++) {
             double sum = 0;
             for (x = 0; x < 12; x++) sum += pt_film_pixel(&film, x, y).g;
             pt_stats_add(&rows, sum);
         }
-        pt_check_mean(label("edge, %s %g, sum of a row", FILTER[filter[k]], radius[k]), &rows, 6, 1e-6, 0.02, PT_TEST_MEANS, "half of twelve columns");
+        pt_check_mean(label("edge, %s %g, sum of a row", FILTER[filter[k]], radius[k]), &rows, 6, 1e-6, 0.02,
+                      PT_TEST_MEANS, "half of twelve columns");
         pt_film_free(&film);
     }
 }
@@ -882,41 +1002,67 @@ static pt_scene scene_of(const char *name, pt_camera *camera)
 {
     const pt_scene_entry *const entry = pt_scene_find(name);
     pt_scene scene = PT_SCENE_INIT;
-    if (!entry || entry->make(&scene, camera) != PT_OK) pt_check(0, name, "cannot be made: %s", pt_scene_error(&scene));
+    if (!entry || entry->make(&scene, camera) != PT_OK)
+        pt_check(0, name, "cannot be made: %s", pt_scene_error(&scene));
     return scene;
 }
+
+enum {
+    T = PT_NEEDS_TRIANGLES,
+    P = PT_NEEDS_PARALLELOGRAMS,
+    S = PT_NEEDS_SPHERES,
+    D = PT_NEEDS_DIFFUSE,
+    M = PT_NEEDS_MIRROR,
+    G = PT_NEEDS_DIELECTRIC,
+    A = PT_NEEDS_AREA_LIGHTS
+};
+static const struct {
+    const char *name;
+    unsigned needs;
+} NEEDS[12] = {{"cornell", T | D | A},
+               {"cornell-empty", T | D | A},
+               {"cornell-spheres", T | S | D | M | G | A},
+               {"furnace", P | D | A},
+               {"diffuse-sphere", S | D | PT_NEEDS_POINT_LIGHTS},
+               {"glass-ball", P | S | D | G | A},
+               {"smallpt", S | D | M | G | A},
+               {"veach-plates", P | S | D | PT_NEEDS_CONDUCTOR | PT_NEEDS_ROUGHNESS | A},
+               {"glossy-box", P | S | D | M | G | PT_NEEDS_PHONG | A},
+               {"caustic-ring", T | P | S | D | M | A | PT_NEEDS_SHADING_NORMALS},
+               {"pool", P | D | M | G | PT_NEEDS_ENVIRONMENT},
+               {"materials", P | S | D | M | G | PT_NEEDS_OREN_NAYAR | PT_NEEDS_PHONG | PT_NEEDS_BLINN |
+                                 PT_NEEDS_COAT | PT_NEEDS_CONDUCTOR | PT_NEEDS_ROUGHNESS | PT_NEEDS_TEXTURES |
+                                 PT_NEEDS_ENVIRONMENT | PT_NEEDS_ENVIRONMENT_IMAGE}};
 
 /* Each scene commits and uses what it is there for; whether it has a tree is a matter of its size. */
 static void scene_needs(void)
 {
-    enum { T = PT_NEEDS_TRIANGLES, P = PT_NEEDS_PARALLELOGRAMS, S = PT_NEEDS_SPHERES, D = PT_NEEDS_DIFFUSE, M = PT_NEEDS_MIRROR, G = PT_NEEDS_DIELECTRIC, A = PT_NEEDS_AREA_LIGHTS };
-    static const struct { const char *name; unsigned needs; } row[12] = {
-        {"cornell", T | D | A}, {"cornell-empty", T | D | A}, {"cornell-spheres", T | S | D | M | G | A}, {"furnace", P | D | A}, {"diffuse-sphere", S | D | PT_NEEDS_POINT_LIGHTS},
-        {"glass-ball", P | S | D | G | A}, {"smallpt", S | D | M | G | A}, {"veach-plates", P | S | D | PT_NEEDS_CONDUCTOR | PT_NEEDS_ROUGHNESS | A},
-        {"glossy-box", P | S | D | M | G | PT_NEEDS_PHONG | A}, {"caustic-ring", T | P | S | D | M | A | PT_NEEDS_SHADING_NORMALS},
-        {"pool", P | D | M | G | PT_NEEDS_ENVIRONMENT},
-        {"materials", P | S | D | M | G | PT_NEEDS_OREN_NAYAR | PT_NEEDS_PHONG | PT_NEEDS_BLINN | PT_NEEDS_COAT | PT_NEEDS_CONDUCTOR | PT_NEEDS_ROUGHNESS | PT_NEEDS_TEXTURES |
-                          PT_NEEDS_ENVIRONMENT | PT_NEEDS_ENVIRONMENT_IMAGE}};
     int count, i;
     const pt_scene_entry *const entry = pt_scenes(&count);
     pt_check(count == 12, "pt_scenes", "%d scenes", count);
     for (i = 0; i < 12 && i < count; i++) {
         pt_camera camera;
-        pt_scene s = scene_of(row[i].name, &camera);
+        pt_scene s = scene_of(NEEDS[i].name, &camera);
         char words[400];
-        pt_check(strcmp(entry[i].name, row[i].name) == 0 && entry[i].summary[0] && s.committed && (pt_scene_needs(&s) & ~(unsigned)PT_NEEDS_BVH) == row[i].needs && dbl(camera.tan_half) > 0,
-                 label("scene %s", row[i].name), "%s: needs %s", entry[i].name, pt_scene_needs_string(&s, words, sizeof words));
-        pt_check(s.degenerate_count == 0, label("scene %s", row[i].name), "%u degenerate shapes", (unsigned)s.degenerate_count);
+        pt_check(strcmp(entry[i].name, NEEDS[i].name) == 0 && entry[i].summary[0] && s.committed &&
+                     (pt_scene_needs(&s) & ~(unsigned)PT_NEEDS_BVH) == NEEDS[i].needs &&
+                     dbl(camera.tan_half) > 0,
+                 label("scene %s", NEEDS[i].name), "%s: needs %s", entry[i].name,
+                 pt_scene_needs_string(&s, words, sizeof words));
+        pt_check(s.degenerate_count == 0, label("scene %s", NEEDS[i].name), "%u degenerate shapes",
+                 (unsigned)s.degenerate_count);
         pt_scene_free(&s);
     }
-    pt_check(pt_scene_find("no such scene") == NULL && pt_scene_find(NULL) == NULL, "pt_scene_find", "finds a scene that is not there");
+    pt_check(pt_scene_find("no such scene") == NULL && pt_scene_find(NULL) == NULL, "pt_scene_find",
+             "finds a scene that is not there");
 }
 
 static double mean_of(pt_rgbd c) { return (c.r + c.g + c.b) / 3; }
 
 /* Two methods in the part [x0,x1] x [y0,y1] of a picture, with the same random numbers: what both see alike, lamps and caustics
    that are hit, does not disturb the difference. 64 means of n Sobol points each; *level is the mean of b. */
-static pt_stats difference_of(const pt_scene *scene, const pt_camera *camera, pt_li_fn a, pt_li_fn b, const double window[4], uint64_t seed, uint32_t n, double *level)
+static pt_stats difference_of(const pt_scene *scene, const pt_camera *camera, pt_li_fn a, pt_li_fn b,
+                              const double window[4], uint64_t seed, uint32_t n, double *level)
 {
     pt_sampler sampler = pt_sampler_make(PT_SAMPLER_SOBOL, pt_test_seed(seed), 0);
     pt_stats s = PT_STATS_INIT;
@@ -935,7 +1081,8 @@ static pt_stats difference_of(const pt_scene *scene, const pt_camera *camera, pt
             pt_ray ray;
             pt_sampler_start(&sampler, unit, i);
             u = pt_sampler_2d(&sampler);
-            ray = pt_camera_ray(camera, 1, (pt_real)(window[0] + (window[1] - window[0]) * dbl(u.x)), (pt_real)(window[2] + (window[3] - window[2]) * dbl(u.y)), pt_v2(0, 0));
+            ray = pt_camera_ray(camera, 1, (pt_real)(window[0] + (window[1] - window[0]) * dbl(u.x)),
+                                (pt_real)(window[2] + (window[3] - window[2]) * dbl(u.y)), pt_v2(0, 0));
             sum += mean_of(a(scene, &ray, &sampler, &options, &info));
             pt_sampler_start(&sampler, unit, i);
             of_b += mean_of(b(scene, &ray, &sampler, &options, &info));
@@ -956,8 +1103,10 @@ static void pool_in_closed_form(void)
     int k;
     for (k = 0; k < 5; k++) {
         const pt_ray ray = pt_camera_ray(&camera, 1, (pt_real)at[k][0], (pt_real)at[k][1], pt_v2(0, 0));
-        const double c = -dbl(ray.d.y), t = sqrt(1 - (1 - c * c) / (n * n)), s = (c - n * t) / (c + n * t), p = (n * c - t) / (n * c + t), F = 0.5 * (s * s + p * p);
-        const double exact = F + (1 - F) / (n * n) * rho * (1 - pt_fresnel_diffuse(n)) / (1 - rho * pt_fresnel_diffuse(1 / n));
+        const double c = -dbl(ray.d.y), t = sqrt(1 - (1 - c * c) / (n * n)), s = (c - n * t) / (c + n * t),
+                     p = (n * c - t) / (n * c + t), F = 0.5 * (s * s + p * p);
+        const double exact =
+            F + (1 - F) / (n * n) * rho * (1 - pt_fresnel_diffuse(n)) / (1 - rho * pt_fresnel_diffuse(1 / n));
         pt_sampler sampler = pt_sampler_make(PT_SAMPLER_INDEPENDENT, pt_test_seed(200 + (uint64_t)k), 0);
         const uint32_t paths = pt_test_samples(72000);
         pt_stats stats = PT_STATS_INIT;
@@ -969,12 +1118,16 @@ static void pool_in_closed_form(void)
         memset(&info, 0, sizeof info);
         options.max_edges = 100; /* what is left after them has met the floor 20 times at least */
         options.roulette = PT_ROULETTE_NONE;
-        pt_check(pt_intersect(&scene, &ray, &hit) && scene.materials[hit.material].kind == PT_MATERIAL_DIELECTRIC, "a pixel of the pool", "does not see the water");
+        pt_check(pt_intersect(&scene, &ray, &hit) &&
+                     scene.materials[hit.material].kind == PT_MATERIAL_DIELECTRIC,
+                 "a pixel of the pool", "does not see the water");
         for (i = 0; i < paths; i++) {
             pt_sampler_start(&sampler, 0, i);
             pt_stats_add(&stats, pt_li_path(&scene, &ray, &sampler, &options, &info).g);
         }
-        pt_check_mean(label("pool, %.1f degrees", acos(c) * 180 / PT_PI), &stats, exact, 1e-5, 0.02, PT_TEST_VALUES, "the walls mirror without loss; radiance in water is that above times (1-F)/n^2");
+        pt_check_mean(label("pool, %.1f degrees", acos(c) * 180 / PT_PI), &stats, exact, 1e-5, 0.02,
+                      PT_TEST_VALUES,
+                      "the walls mirror without loss; radiance in water is that above times (1-F)/n^2");
     }
     pt_scene_free(&scene);
 }
@@ -988,11 +1141,15 @@ static void veach_plates(void)
     pt_scene scene = scene_of("veach-plates", &camera);
     int block, m;
     for (block = 0; block < 6; block++) {
-        const double window[4] = {block % 2 * 0.5, block % 2 * 0.5 + 0.5, (block / 2) / 3.0, (block / 2 + 1) / 3.0};
+        const double window[4] = {block % 2 * 0.5, block % 2 * 0.5 + 0.5, (block / 2) / 3.0,
+                                  (block / 2 + 1) / 3.0};
         for (m = 1; m < 3; m++) {
             double level;
-            const pt_stats s = difference_of(&scene, &camera, li[m], li[0], window, 210 + (uint64_t)(2 * block + m), 1000, &level);
-            pt_check_mean(label("veach-plates, part %d of mean %.3f: %s - path", block, level, name[m]), &s, 0, 1e-5 * level, 0, PT_TEST_MEANS, "densities of GGX, of the light choice, or the weights of MIS");
+            const pt_stats s = difference_of(&scene, &camera, li[m], li[0], window,
+                                             210 + (uint64_t)(2 * block + m), 1000, &level);
+            pt_check_mean(label("veach-plates, part %d of mean %.3f: %s - path", block, level, name[m]), &s,
+                          0, 1e-5 * level, 0, PT_TEST_MEANS,
+                          "densities of GGX, of the light choice, or the weights of MIS");
         }
     }
     pt_scene_free(&scene);
@@ -1046,8 +1203,10 @@ static void ring_cusp(void)
         best = fmax(best, value);
     }
     left = ring_caustic(&scene, &lpe, 0.2, 255, n);
-    pt_check(at > 0.467 - 0.033 - 0.025 && at < 0.467 + 0.077 + 0.025, "cusp of the nephroid", "the light on the axis is brightest at x = %g, not near half a radius", at);
-    pt_check(best > 2 * left, "cusp of the nephroid", "is only %g times as bright as the floor before it", best / left);
+    pt_check(at > 0.467 - 0.033 - 0.025 && at < 0.467 + 0.077 + 0.025, "cusp of the nephroid",
+             "the light on the axis is brightest at x = %g, not near half a radius", at);
+    pt_check(best > 2 * left, "cusp of the nephroid", "is only %g times as bright as the floor before it",
+             best / left);
     pt_scene_free(&scene);
 }
 #endif
@@ -1061,9 +1220,13 @@ static void ring_methods(void)
     pt_scene scene = scene_of("caustic-ring", &camera);
     double level;
     pt_stats s = difference_of(&scene, &camera, pt_li_path, pt_li_path_plain, all, 260, 2500, &level);
-    pt_check_mean(label("caustic-ring of mean %.3f: path - plain", level), &s, 0, 1e-5 * level, 0, PT_TEST_MEANS, "a caustic counts once: after a mirror all of the lamp, after the floor its share");
+    pt_check_mean(label("caustic-ring of mean %.3f: path - plain", level), &s, 0, 1e-5 * level, 0,
+                  PT_TEST_MEANS,
+                  "a caustic counts once: after a mirror all of the lamp, after the floor its share");
     s = difference_of(&scene, &camera, pt_li_path, pt_li_path_light, all, 261, 600, &level);
-    pt_check_mean(label("caustic-ring of mean %.3f: path - light", level), &s, 0, 1e-5 * level, 0.02 * level, PT_TEST_MEANS, "light sampling must count the lamp after a mirror, and not after the floor");
+    pt_check_mean(label("caustic-ring of mean %.3f: path - light", level), &s, 0, 1e-5 * level, 0.02 * level,
+                  PT_TEST_MEANS,
+                  "light sampling must count the lamp after a mirror, and not after the floor");
     pt_scene_free(&scene);
 }
 #endif

@@ -13,7 +13,10 @@
 static double dbl(pt_real x) { return (double)x; }
 static pt_rgb grey(double v) { return pt_rgb_grey((pt_real)v); }
 static pt_vec3 v3(double x, double y, double z) { return pt_v3((pt_real)x, (pt_real)y, (pt_real)z); }
-static double dot3(pt_vec3 a, pt_vec3 b) { return dbl(a.x) * dbl(b.x) + dbl(a.y) * dbl(b.y) + dbl(a.z) * dbl(b.z); }
+static double dot3(pt_vec3 a, pt_vec3 b)
+{
+    return dbl(a.x) * dbl(b.x) + dbl(a.y) * dbl(b.y) + dbl(a.z) * dbl(b.z);
+}
 
 static pt_ray ray_from(pt_vec3 o, pt_vec3 d)
 {
@@ -44,7 +47,8 @@ static stage stage_of(const char *name)
     stage s;
     memset(&s.camera, 0, sizeof s.camera);
     s.scene = empty;
-    if (!entry || entry->make(&s.scene, &s.camera) != PT_OK) pt_check(0, name, "cannot be made: %s", pt_scene_error(&s.scene));
+    if (!entry || entry->make(&s.scene, &s.camera) != PT_OK)
+        pt_check(0, name, "cannot be made: %s", pt_scene_error(&s.scene));
     return s;
 }
 
@@ -156,17 +160,27 @@ static void table(void)
 {
     const unsigned delta = PT_NEEDS_POINT_LIGHTS | PT_NEEDS_SPOT_LIGHTS | PT_NEEDS_DIRECTIONAL_LIGHTS;
     const unsigned sky = PT_NEEDS_ENVIRONMENT | PT_NEEDS_ENVIRONMENT_IMAGE;
-    const struct { const char *name; pt_li_fn li; unsigned lacks; int follows, classes; } row[7] = {
-        {"path", pt_li_path, 0, 1, 1},           {"path-light", pt_li_path_light, 0, 1, 1}, {"path-plain", pt_li_path_plain, delta, 1, 1},
-        {"local", pt_li_local, sky, 0, 0},       {"whitted", pt_li_whitted, sky, 0, 0},     {"distribution", pt_li_distribution, 0, 0, 1},
-        {"branching", pt_li_branching, delta, 0, 0}};
+    const struct {
+        const char *name;
+        pt_li_fn li;
+        unsigned lacks;
+        int follows, classes;
+    } row[7] = {{"path", pt_li_path, 0, 1, 1},
+                {"path-light", pt_li_path_light, 0, 1, 1},
+                {"path-plain", pt_li_path_plain, delta, 1, 1},
+                {"local", pt_li_local, sky, 0, 0},
+                {"whitted", pt_li_whitted, sky, 0, 0},
+                {"distribution", pt_li_distribution, 0, 0, 1},
+                {"branching", pt_li_branching, delta, 0, 0}};
     int count, i;
     const pt_method *const m = pt_methods(&count);
     pt_check(count == 7, "pt_methods", "%d methods", count);
     for (i = 0; i < 7 && i < count; i++)
-        pt_check(strcmp(m[i].name, row[i].name) == 0 && m[i].li == row[i].li && m[i].handles == (PT_NEEDS_ALL & ~row[i].lacks) &&
-                     m[i].follows == row[i].follows && m[i].classes == row[i].classes && pt_method_find(row[i].name) == &m[i],
-                 label("method %s", row[i].name), "%s: handles %x, follows %d, classes %d", m[i].name, m[i].handles, m[i].follows, m[i].classes);
+        pt_check(strcmp(m[i].name, row[i].name) == 0 && m[i].li == row[i].li &&
+                     m[i].handles == (PT_NEEDS_ALL & ~row[i].lacks) && m[i].follows == row[i].follows &&
+                     m[i].classes == row[i].classes && pt_method_find(row[i].name) == &m[i],
+                 label("method %s", row[i].name), "%s: handles %x, follows %d, classes %d", m[i].name,
+                 m[i].handles, m[i].follows, m[i].classes);
 }
 
 /* What a method does not handle is black: lights that no ray hits for the plain methods. */
@@ -184,7 +198,8 @@ static void not_handled(void)
         experiment e = experiment_of(&scene, plain[k], 3);
         pt_li_info info;
         e.ray = ray_from(v3(0, 2, 0), v3(0, -1, 0));
-        pt_check(without_noise(&e, &info).r == 0, label("%s under lights that cannot be hit", plain[k]), "is not black");
+        pt_check(without_noise(&e, &info).r == 0, label("%s under lights that cannot be hit", plain[k]),
+                 "is not black");
     }
     pt_scene_free(&scene);
 }
@@ -196,7 +211,9 @@ static pt_scene lecture_scene(pt_material m, int lights, int shadow)
 {
     pt_scene scene = PT_SCENE_INIT;
     pt_add_parallelogram(&scene, v3(-5, 0, -5), v3(0, 0, 10), v3(10, 0, 0), pt_add_material(&scene, m));
-    if (shadow) pt_add_parallelogram(&scene, v3(-5, 2, -5), v3(0, 0, 10), v3(10, 0, 0), pt_add_material(&scene, pt_material_diffuse(grey(0.3))));
+    if (shadow)
+        pt_add_parallelogram(&scene, v3(-5, 2, -5), v3(0, 0, 10), v3(10, 0, 0),
+                             pt_add_material(&scene, pt_material_diffuse(grey(0.3))));
     pt_add_point_light(&scene, v3(1, 3, -1), pt_rgb3(20, 10, 5));
     if (lights > 1) pt_add_directional_light(&scene, v3(0, -1, 1), grey(2));
     if (lights > 2) pt_add_spot_light(&scene, v3(-1, 4, 0), v3(0, -1, 0), grey(30), 60, 80);
@@ -204,10 +221,10 @@ static pt_scene lecture_scene(pt_material m, int lights, int shadow)
 }
 
 /* kd (n.l) I/r^2 and ks (n.h)^p I/r^2, from the same numbers by hand; from above or from below the floor. */
-static void add_local(pt_vec3 p, pt_vec3 wo, double side, pt_vec3 to_light, double irradiance, double kd, double ks, double exponent, double *sum)
+static void add_local(pt_vec3 wo, double side, pt_vec3 to_light, double irradiance, double kd, double ks,
+                      double exponent, double *sum)
 {
     const pt_vec3 l = pt_v3_normalize(to_light), h = pt_v3_normalize(pt_v3_add(l, wo));
-    (void)p;
     *sum += irradiance * (kd * fmax(0, side * dbl(l.y)) + ks * pow(fmax(0, side * dbl(h.y)), exponent));
 }
 
@@ -217,21 +234,29 @@ static void local_by_hand(void)
     int lights, view;
     for (lights = 1; lights <= 3; lights++)
         for (view = 0; view < 6; view++) {
-            pt_scene scene = lecture_scene(pt_material_phong(grey(kd), grey(ks), (pt_real)exponent), lights, view != 5);
-            const pt_vec3 p = v3(0.3 * view - 0.6, 0, 0.2 * view), eye = v3(-1 + 0.4 * view, view == 5 ? -1 : 1.5, 1), wo = pt_v3_normalize(pt_v3_sub(eye, p));
+            pt_scene scene =
+                lecture_scene(pt_material_phong(grey(kd), grey(ks), (pt_real)exponent), lights, view != 5);
+            const pt_vec3 p = v3(0.3 * view - 0.6, 0, 0.2 * view),
+                          eye = v3(-1 + 0.4 * view, view == 5 ? -1 : 1.5, 1),
+                          wo = pt_v3_normalize(pt_v3_sub(eye, p));
             const pt_vec3 lamp = pt_v3_sub(v3(1, 3, -1), p), spot = pt_v3_sub(v3(-1, 4, 0), p);
             const double side = view == 5 ? -1 : 1, ds = sqrt(dot3(spot, spot));
             experiment e = experiment_of(&scene, "local", 0);
             double exact = ambient * kd;
             pt_li_info info;
             pt_rgbd got;
-            add_local(p, wo, side, lamp, 20 / dot3(lamp, lamp), kd, ks, exponent, &exact);
-            if (lights > 1) add_local(p, wo, side, v3(0, 1, -1), 2, kd, ks, exponent, &exact);
-            if (lights > 2) add_local(p, wo, side, spot, 30 * pt_spot_falloff(dbl(spot.y) / ds, cos(PT_PI / 3), cos(80 * PT_PI / 180)) / (ds * ds), kd, ks, exponent, &exact);
+            add_local(wo, side, lamp, 20 / dot3(lamp, lamp), kd, ks, exponent, &exact);
+            if (lights > 1) add_local(wo, side, v3(0, 1, -1), 2, kd, ks, exponent, &exact);
+            if (lights > 2)
+                add_local(wo, side, spot,
+                          30 * pt_spot_falloff(dbl(spot.y) / ds, cos(PT_PI / 3), cos(80 * PT_PI / 180)) /
+                              (ds * ds),
+                          kd, ks, exponent, &exact);
             e.ray = ray_from(eye, pt_v3_sub(p, eye));
             e.options.ambient = grey(ambient);
             got = without_noise(&e, &info);
-            pt_check_near(label("local, %d lights, view %d", lights, view), got.r, exact, 3e-6 * exact, "ka Ia + sum of I/r^2 (kd n.l + ks (n.h)^p), no shadows");
+            pt_check_near(label("local, %d lights, view %d", lights, view), got.r, exact, 3e-6 * exact,
+                          "ka Ia + sum of I/r^2 (kd n.l + ks (n.h)^p), no shadows");
             pt_check(info.rays == 1 && info.hit, "local traces one ray", "%g rays", (double)info.rays);
             pt_scene_free(&scene);
         }
@@ -244,22 +269,33 @@ static void middle_of_lamps(void)
     int i, kind;
     for (kind = 0; kind < 2; kind++)
         for (i = 0; i < 3; i++) {
-            const double h = 2, r = 0.8, d = sqrt(h * h + x[i] * x[i]), omega = kind == 0 ? 2 * PT_PI * (1 - sqrt(1 - r * r / (d * d))) : pt_solid_angle_rectangle(v3(0, 0, 0), v3(x[i] - 0.01, h, -0.01), v3(0.02, 0, 0), v3(0, 0, 0.02));
+            const double h = 2, r = 0.8, d = sqrt(h * h + x[i] * x[i]),
+                         omega = kind == 0 ? 2 * PT_PI * (1 - sqrt(1 - r * r / (d * d)))
+                                           : pt_solid_angle_rectangle(v3(0, 0, 0), v3(x[i] - 0.01, h, -0.01),
+                                                                      v3(0.02, 0, 0), v3(0, 0, 0.02));
             const double rho = 0.6, exact = 5 * omega * h / d * rho;
             pt_scene scene = PT_SCENE_INIT;
             experiment e;
             pt_li_info info;
-            pt_add_parallelogram(&scene, v3(-5, 0, -5), v3(0, 0, 10), v3(10, 0, 0), pt_add_material(&scene, pt_material_diffuse(grey(rho))));
-            if (kind == 0) pt_add_sphere(&scene, v3(x[i], h, 0), (pt_real)r, pt_add_material(&scene, pt_material_emitter(grey(5))));
-            else pt_add_parallelogram(&scene, v3(x[i] - 0.01, h, -0.01), v3(0.02, 0, 0), v3(0, 0, 0.02), pt_add_material(&scene, pt_material_emitter(grey(5))));
+            pt_add_parallelogram(&scene, v3(-5, 0, -5), v3(0, 0, 10), v3(10, 0, 0),
+                                 pt_add_material(&scene, pt_material_diffuse(grey(rho))));
+            if (kind == 0)
+                pt_add_sphere(&scene, v3(x[i], h, 0), (pt_real)r,
+                              pt_add_material(&scene, pt_material_emitter(grey(5))));
+            else
+                pt_add_parallelogram(&scene, v3(x[i] - 0.01, h, -0.01), v3(0.02, 0, 0), v3(0, 0, 0.02),
+                                     pt_add_material(&scene, pt_material_emitter(grey(5))));
             scene = committed(scene);
             e = experiment_of(&scene, "local", 0);
             e.ray = ray_from(v3(-2, 0.01, 0), v3(2, -0.01, 0));
-            pt_check_near(label("local, %s %g m aside", kind ? "panel" : "ball", x[i]), without_noise(&e, &info).g, exact, 1e-4 * exact,
-                          "light from the middle of the lamp: radiance times solid angle times the cosine of the line to its centre");
+            pt_check_near(label("local, %s %g m aside", kind ? "panel" : "ball", x[i]),
+                          without_noise(&e, &info).g, exact, 1e-4 * exact,
+                          "light from the middle of the lamp: radiance times solid angle times the cosine of "
+                          "the line to its centre");
             e = experiment_of(&scene, "whitted", 2);
             e.ray = ray_from(v3(-2, 0.01, 0), v3(2, -0.01, 0));
-            pt_check_near(label("whitted, %s %g m aside", kind ? "panel" : "ball", x[i]), without_noise(&e, &info).g, exact / PT_PI, 1e-4 * exact, "the same with rho / pi");
+            pt_check_near(label("whitted, %s %g m aside", kind ? "panel" : "ball", x[i]),
+                          without_noise(&e, &info).g, exact / PT_PI, 1e-4 * exact, "the same with rho / pi");
             pt_scene_free(&scene);
         }
 }
@@ -277,9 +313,11 @@ static void local_and_path(void)
     int view;
     pt_check(pt_lpe_compile(&lpe, words, 2, NULL) == PT_OK, "LDE and LGE", "are refused");
     for (view = 0; view < 6; view++) {
-        const pt_vec3 at = v3(0.4 * view - 0.6, 0, 0.2 * view - 0.5), eye = v3(-1, 2, 1), lamp = pt_v3_sub(v3(1, 3, -1), at);
+        const pt_vec3 at = v3(0.4 * view - 0.6, 0, 0.2 * view - 0.5), eye = v3(-1, 2, 1),
+                      lamp = pt_v3_sub(v3(1, 3, -1), at);
         const double cosine = dbl(lamp.y) / sqrt(dot3(lamp, lamp));
-        experiment path = experiment_of(&scene, "path", 2), all = experiment_of(&scene, "local", 0), diffuse = experiment_of(&matt, "local", 0);
+        experiment path = experiment_of(&scene, "path", 2), all = experiment_of(&scene, "local", 0),
+                   diffuse = experiment_of(&matt, "local", 0);
         pt_li_info info;
         double lde, lge, d;
         path.ray = all.ray = diffuse.ray = ray_from(eye, pt_v3_sub(at, eye));
@@ -288,8 +326,11 @@ static void local_and_path(void)
         path.which = 1;
         lge = without_noise(&path, &info).r;
         d = without_noise(&diffuse, &info).r;
-        pt_check_near("LDE is the slides' diffuse term / pi", PT_PI * lde, d, 1e-5 * d, "rho / pi against kd");
-        pt_check_near("LGE is the slides' highlight times N(p) cos", lge, (without_noise(&all, &info).r - d) * N * cosine, 1e-5 * (d + lge), "Blinn-Phong with its normalisation and the cosine of the light");
+        pt_check_near("LDE is the slides' diffuse term / pi", PT_PI * lde, d, 1e-5 * d,
+                      "rho / pi against kd");
+        pt_check_near("LGE is the slides' highlight times N(p) cos", lge,
+                      (without_noise(&all, &info).r - d) * N * cosine, 1e-5 * (d + lge),
+                      "Blinn-Phong with its normalisation and the cosine of the light");
     }
     pt_scene_free(&scene);
     pt_scene_free(&matt);
@@ -309,14 +350,24 @@ static pt_lpe one_class(const char *expression)
 static pt_scene many_balls(int glassy)
 {
     pt_scene s = PT_SCENE_INIT;
-    pt_add_parallelogram(&s, v3(-6, 0, -6), v3(0, 0, 12), v3(12, 0, 0), pt_add_material(&s, pt_material_diffuse(pt_rgb3((pt_real)0.6, (pt_real)0.5, (pt_real)0.4))));
-    pt_add_parallelogram(&s, v3(-6, 0, -3), v3(12, 0, 0), v3(0, 5, 0), pt_add_material(&s, pt_material_mirror(grey(0.8))));
-    pt_add_sphere(&s, v3(-2, 0.7, 0), (pt_real)0.7, pt_add_material(&s, pt_material_mirror(pt_rgb3((pt_real)0.9, (pt_real)0.7, (pt_real)0.5))));
-    pt_add_sphere(&s, v3(-0.5, 0.6, 1), (pt_real)0.6, pt_add_material(&s, pt_material_phong(grey(0.3), grey(0.5), 30)));
-    pt_add_sphere(&s, v3(0.5, 0.7, -1), (pt_real)0.7, pt_add_material(&s, pt_material_conductor(pt_rgb3(1, (pt_real)0.5, (pt_real)0.2), grey(4), 0)));
+    pt_add_parallelogram(
+        &s, v3(-6, 0, -6), v3(0, 0, 12), v3(12, 0, 0),
+        pt_add_material(&s, pt_material_diffuse(pt_rgb3((pt_real)0.6, (pt_real)0.5, (pt_real)0.4))));
+    pt_add_parallelogram(&s, v3(-6, 0, -3), v3(12, 0, 0), v3(0, 5, 0),
+                         pt_add_material(&s, pt_material_mirror(grey(0.8))));
+    pt_add_sphere(&s, v3(-2, 0.7, 0), (pt_real)0.7,
+                  pt_add_material(&s, pt_material_mirror(pt_rgb3((pt_real)0.9, (pt_real)0.7, (pt_real)0.5))));
+    pt_add_sphere(&s, v3(-0.5, 0.6, 1), (pt_real)0.6,
+                  pt_add_material(&s, pt_material_phong(grey(0.3), grey(0.5), 30)));
+    pt_add_sphere(
+        &s, v3(0.5, 0.7, -1), (pt_real)0.7,
+        pt_add_material(&s, pt_material_conductor(pt_rgb3(1, (pt_real)0.5, (pt_real)0.2), grey(4), 0)));
     if (glassy) {
-        pt_add_sphere(&s, v3(1, 0.6, 1.2), (pt_real)0.6, pt_add_material(&s, pt_material_dielectric((pt_real)1.5)));
-        pt_add_sphere(&s, v3(2.2, 0.7, 0), (pt_real)0.7, pt_add_material(&s, pt_material_coat(pt_rgb3((pt_real)0.1, (pt_real)0.5, (pt_real)0.3), (pt_real)1.5)));
+        pt_add_sphere(&s, v3(1, 0.6, 1.2), (pt_real)0.6,
+                      pt_add_material(&s, pt_material_dielectric((pt_real)1.5)));
+        pt_add_sphere(&s, v3(2.2, 0.7, 0), (pt_real)0.7,
+                      pt_add_material(&s, pt_material_coat(pt_rgb3((pt_real)0.1, (pt_real)0.5, (pt_real)0.3),
+                                                           (pt_real)1.5)));
     }
     return s;
 }
@@ -341,26 +392,31 @@ static void whitted_by_rays(void)
         if (kind == 2) pt_add_directional_light(&scene, v3(-0.3, -1, -0.4), grey(3));
         scene = committed(scene);
         for (i = 0; i < 600; i++) {
-            experiment tree = experiment_of(&scene, "whitted", edges = 2 + i % 4), path = experiment_of(&scene, "path", edges);
+            experiment tree = experiment_of(&scene, "whitted", edges = 2 + i % 4),
+                       path = experiment_of(&scene, "path", edges);
             pt_li_info info;
             double a, b;
-            tree.ray = path.ray = pt_camera_ray(ball_camera(), 1, (pt_real)((i % 24 + 0.5) / 24), (pt_real)((i / 24 + 0.5) / 25), pt_v2(0, 0));
+            tree.ray = path.ray = pt_camera_ray(ball_camera(), 1, (pt_real)((i % 24 + 0.5) / 24),
+                                                (pt_real)((i / 24 + 0.5) / 25), pt_v2(0, 0));
             path.options.lpe = &lpe;
             a = without_noise(&tree, &info).r;
             b = without_noise(&path, &info).r;
             worst = fmax(worst, fabs(a - b) / fmax(1e-2, b));
             sum += a;
         }
-        pt_check(worst < 1e-4 && sum > 10, label("whitted = path of L(D|G)?S*E, light %d", kind), "off by %.3g of a ray's radiance; the mean is %g", worst, sum / 600);
+        pt_check(worst < 1e-4 && sum > 10, label("whitted = path of L(D|G)?S*E, light %d", kind),
+                 "off by %.3g of a ray's radiance; the mean is %g", worst, sum / 600);
         pt_scene_free(&scene);
     }
 }
 
-static void check_classes_agree(const char *name, const experiment *method, const experiment *path, uint64_t seed, uint32_t n, double bound, const char *hint)
+static void check_classes_agree(const char *name, const experiment *method, const experiment *path,
+                                uint64_t seed, uint32_t n, double bound, const char *hint)
 {
     double level;
     const pt_stats difference = by_pairs(method, path, seed, n, &level);
-    pt_check_mean(label("%s: difference", name), &difference, 0, 1e-5 * level, bound * level, PT_TEST_MEANS, hint);
+    pt_check_mean(label("%s: difference", name), &difference, 0, 1e-5 * level, bound * level, PT_TEST_MEANS,
+                  hint);
 }
 
 /* With glass, a coat and three lights, in the mean over the picture. */
@@ -377,7 +433,8 @@ static void whitted_in_the_mean(void)
     path = experiment_of(&scene, "path", 6);
     tree.camera = path.camera = ball_camera();
     path.options.lpe = &lpe;
-    check_classes_agree("whitted = path of L(D|G)?S*E", &tree, &path, 100, 13000, 0.02, "each specular branch has its whole weight: reflected and refracted, Fresnel once");
+    check_classes_agree("whitted = path of L(D|G)?S*E", &tree, &path, 100, 13000, 0.02,
+                        "each specular branch has its whole weight: reflected and refracted, Fresnel once");
     pt_scene_free(&scene);
 }
 
@@ -391,10 +448,12 @@ static void distribution_in_the_mean(void)
     for (k = 0; k < 4; k++) {
         stage s;
         experiment method, path;
-        if (k < 3) s = stage_of(name[k]);
+        if (k < 3)
+            s = stage_of(name[k]);
         else {
             s.scene = many_balls(1);
-            pt_add_parallelogram(&s.scene, v3(-2, 5, 0), v3(4, 0, 0), v3(0, 0, 4), pt_add_material(&s.scene, pt_material_emitter(grey(4))));
+            pt_add_parallelogram(&s.scene, v3(-2, 5, 0), v3(4, 0, 0), v3(0, 0, 4),
+                                 pt_add_material(&s.scene, pt_material_emitter(grey(4))));
             s.scene = committed(s.scene);
             s.camera = *ball_camera();
         }
@@ -402,8 +461,10 @@ static void distribution_in_the_mean(void)
         path = experiment_of(&s.scene, "path", 5);
         method.camera = path.camera = &s.camera;
         path.options.lpe = &lpe;
-        check_classes_agree(label("distribution = path of L[DGS]?[GS]*E, %s", name[k]), &method, &path, 110 + (uint64_t)k, n[k], 0.02,
-                            "gloss and mirrors are followed, light that a diffuse direction would find is left to light sampling");
+        check_classes_agree(label("distribution = path of L[DGS]?[GS]*E, %s", name[k]), &method, &path,
+                            110 + (uint64_t)k, n[k], 0.02,
+                            "gloss and mirrors are followed, light that a diffuse direction would find is "
+                            "left to light sampling");
         pt_scene_free(&s.scene);
     }
 }
@@ -424,7 +485,8 @@ static void distribution_words(void)
         e.which = k;
         sum[k] = by_means(&e, 130, 64);
     }
-    pt_check(sum[0].mean > 0.01 && sum[1].mean == 0, "words of distribution", "%g of its light is in other classes than L[DGS]?[GS]*E", sum[1].mean);
+    pt_check(sum[0].mean > 0.01 && sum[1].mean == 0, "words of distribution",
+             "%g of its light is in other classes than L[DGS]?[GS]*E", sum[1].mean);
     pt_scene_free(&s.scene);
 }
 #endif
@@ -440,7 +502,8 @@ static void branching_rays(void)
     int k;
     for (k = 0; k < 4; k++) {
         experiment e = experiment_of(&s.scene, "branching", edges[k]);
-        const int n = branching[k] ? branching[k] : 4, most = edges[k] ? edges[k] : 4; /* the documented defaults */
+        const int n = branching[k] ? branching[k] : 4,
+                  most = edges[k] ? edges[k] : 4; /* the documented defaults */
         double rays = 0, power = 1;
         pt_li_info info;
         pt_rgbd got;
@@ -449,8 +512,11 @@ static void branching_rays(void)
         e.options.branching = branching[k];
         e.ray = ray_from(v3(0.1, -0.2, 0.3), v3(0.3, 0.5, -0.8));
         got = without_noise(&e, &info);
-        pt_check((double)info.rays == rays && info.edges == most, label("branching %d, %d edges: rays", branching[k], edges[k]), "%g rays, not %g; %d edges", (double)info.rays, rays, info.edges);
-        pt_check_near(label("branching %d, %d edges in a furnace", branching[k], edges[k]), got.r, 2 - ldexp(1, 1 - most), 1e-5, "the mean over the branches: 1/N of their sum");
+        pt_check((double)info.rays == rays && info.edges == most,
+                 label("branching %d, %d edges: rays", branching[k], edges[k]), "%g rays, not %g; %d edges",
+                 (double)info.rays, rays, info.edges);
+        pt_check_near(label("branching %d, %d edges in a furnace", branching[k], edges[k]), got.r,
+                      2 - ldexp(1, 1 - most), 1e-5, "the mean over the branches: 1/N of their sum");
     }
     pt_scene_free(&s.scene);
 }
@@ -469,10 +535,12 @@ static pt_scene uneven_room(void)
         c[k % 3] = sign;
         a[(k + (k < 3 ? 1 : 2)) % 3] = 2;
         b[(k + (k < 3 ? 2 : 1)) % 3] = 2;
-        pt_add_parallelogram(&s, v3(c[0], c[1], c[2]), v3(a[0], a[1], a[2]), v3(b[0], b[1], b[2]), k % 2 ? glow : dark);
+        pt_add_parallelogram(&s, v3(c[0], c[1], c[2]), v3(a[0], a[1], a[2]), v3(b[0], b[1], b[2]),
+                             k % 2 ? glow : dark);
     }
     pt_add_sphere(&s, v3(0.3, -0.4, 0), (pt_real)0.4, pt_add_material(&s, pt_material_mirror(grey(0.9))));
-    pt_add_sphere(&s, v3(-0.5, 0.3, -0.3), (pt_real)0.3, pt_add_material(&s, pt_material_conductor(grey(0.5), grey(3), (pt_real)0.6)));
+    pt_add_sphere(&s, v3(-0.5, 0.3, -0.3), (pt_real)0.3,
+                  pt_add_material(&s, pt_material_conductor(grey(0.5), grey(3), (pt_real)0.6)));
     return committed(s);
 }
 
@@ -493,7 +561,8 @@ static void branching_is_plain(void)
         e.camera = &camera;
         e.options.branching = branching[k];
         s = by_means(&e, 141 + (uint64_t)k, n[k]);
-        pt_check_equal_means(label("branching %d = path-plain, 4 edges", branching[k]), &s, &reference, 0.02, "L = Le + 1/N sum of f cos / p L");
+        pt_check_equal_means(label("branching %d = path-plain, 4 edges", branching[k]), &s, &reference, 0.02,
+                             "L = Le + 1/N sum of f cos / p L");
     }
     pt_scene_free(&scene);
 }
@@ -501,7 +570,14 @@ static void branching_is_plain(void)
 /* Two mirrors face each other: a path ends by its number of edges alone. 0 means 12 for whitted and distribution. */
 static void default_edges(void)
 {
-    static const struct { const char *method; int given, edges; } row[5] = {{"whitted", 0, 12}, {"whitted", 5, 5}, {"distribution", 0, 12}, {"distribution", 7, 7}, {"local", 0, 1}};
+    static const struct {
+        const char *method;
+        int given, edges;
+    } row[5] = {{"whitted", 0, 12},
+                {"whitted", 5, 5},
+                {"distribution", 0, 12},
+                {"distribution", 7, 7},
+                {"local", 0, 1}};
     pt_scene scene = PT_SCENE_INIT;
     const int mirror = pt_add_material(&scene, pt_material_mirror(grey(0.99)));
     int k;
@@ -513,7 +589,9 @@ static void default_edges(void)
         pt_li_info info;
         e.ray = ray_from(v3(0, 0.5, 0), v3(0, 1, 0));
         (void)without_noise(&e, &info);
-        pt_check(info.edges == row[k].edges && info.rays == (uint64_t)row[k].edges, label("%s, max_edges %d", row[k].method, row[k].given), "%d edges, %g rays", info.edges, (double)info.rays);
+        pt_check(info.edges == row[k].edges && info.rays == (uint64_t)row[k].edges,
+                 label("%s, max_edges %d", row[k].method, row[k].given), "%d edges, %g rays", info.edges,
+                 (double)info.rays);
     }
     pt_scene_free(&scene);
 }
@@ -523,11 +601,21 @@ static void default_edges(void)
 static void bad_options(void)
 {
     enum { BRANCHING, AMBIENT, FILTER, RADIUS, METHOD };
-    static const struct { const char *name; int field; double value; const char *what; } bad[] = {
-        {"branching -1", BRANCHING, -1, "li.branching"}, {"branching 1025", BRANCHING, 1025, "li.branching"}, {"ambient NaN", AMBIENT, (double)NAN, "li.ambient"},
-        {"ambient infinite", AMBIENT, HUGE_VAL, "li.ambient"}, {"filter 3", FILTER, 3, "desc.filter"}, {"filter -1", FILTER, -1, "desc.filter"},
-        {"filter radius -1", RADIUS, -1, "filter_radius"}, {"filter radius 65", RADIUS, 65, "filter_radius"}, {"filter radius NaN", RADIUS, (double)NAN, "filter_radius"},
-        {"a method of that name", METHOD, 0, "unknown"}};
+    static const struct {
+        const char *name;
+        int field;
+        double value;
+        const char *what;
+    } bad[] = {{"branching -1", BRANCHING, -1, "li.branching"},
+               {"branching 1025", BRANCHING, 1025, "li.branching"},
+               {"ambient NaN", AMBIENT, (double)NAN, "li.ambient"},
+               {"ambient infinite", AMBIENT, HUGE_VAL, "li.ambient"},
+               {"filter 3", FILTER, 3, "desc.filter"},
+               {"filter -1", FILTER, -1, "desc.filter"},
+               {"filter radius -1", RADIUS, -1, "filter_radius"},
+               {"filter radius 65", RADIUS, 65, "filter_radius"},
+               {"filter radius NaN", RADIUS, (double)NAN, "filter_radius"},
+               {"a method of that name", METHOD, 0, "unknown"}};
     stage s = stage_of("furnace");
     size_t i;
     for (i = 0; i < sizeof bad / sizeof bad[0]; i++) {
@@ -544,7 +632,9 @@ static void bad_options(void)
         if (bad[i].field == RADIUS) d.filter_radius = bad[i].value;
         if (bad[i].field == METHOD) d.method = "whited";
         result = pt_render(&s.scene, &d, &film, &report);
-        pt_check(result == PT_ERROR_ARGUMENT && report.error && strstr(report.error, bad[i].what) && !film.half[0], bad[i].name, "'%s', sentence '%s'", pt_result_string(result),
+        pt_check(result == PT_ERROR_ARGUMENT && report.error && strstr(report.error, bad[i].what) &&
+                     !film.half[0],
+                 bad[i].name, "'%s', sentence '%s'", pt_result_string(result),
                  report.error ? report.error : "none");
         pt_film_free(&film);
         pt_report_free(&report);
@@ -559,7 +649,6 @@ static void bad_options(void)
    expression can end: no automaton, read from the light to the eye. */
 typedef struct matcher {
     const char *word;
-    unsigned all; /* every place */
 } matcher;
 
 static unsigned match_or(const matcher *m, const char **at, unsigned from);
@@ -592,7 +681,8 @@ static unsigned match_atom(const matcher *m, const char **at, unsigned from)
 }
 
 /* The atom at `atom`, with the first `count` of the signs behind it. */
-static unsigned match_repeated(const matcher *m, const char *atom, const char *signs, int count, unsigned from)
+static unsigned match_repeated(const matcher *m, const char *atom, const char *signs, int count,
+                               unsigned from)
 {
     unsigned to, more;
     if (count == 0) return match_atom(m, &atom, from);
@@ -633,7 +723,6 @@ static int matches(const char *expression, const char *word)
 {
     matcher m;
     m.word = word;
-    m.all = 0;
     return (int)(match_or(&m, &expression, 1u) >> strlen(word) & 1u);
 }
 
@@ -661,7 +750,8 @@ static int words_off(const pt_lpe *lpe, const char *const *list, int count, int 
     char word[16];
     for (k = 0; k < words; k++) {
         word_of(k, "DGSV", word);
-        for (c = 0; c < count && !matches(list[c], word); c++) {}
+        for (c = 0; c < count && !matches(list[c], word); c++) {
+        }
         if (pt_lpe_class(lpe, word) != c && off++ == 0) strcpy(example, word);
     }
     return off;
@@ -673,25 +763,70 @@ static void check_list(const char *const *list, int count, int words)
     char example[16] = "";
     pt_lpe lpe;
     int off;
-    pt_check(pt_lpe_compile(&lpe, list, count, &error) == PT_OK && !error && lpe.class_count == count + 1, list[0], "is refused: %s", error ? error : "no sentence");
+    pt_check(pt_lpe_compile(&lpe, list, count, &error) == PT_OK && !error && lpe.class_count == count + 1,
+             list[0], "is refused: %s", error ? error : "no sentence");
     off = lpe.class_count ? words_off(&lpe, list, count, words, example) : words;
-    pt_check(off == 0, label("%s, %d expressions", list[0], count), "%d of %d words are in another class, first %s: the first expression that matches counts", off, words, example);
+    pt_check(off == 0, label("%s, %d expressions", list[0], count),
+             "%d of %d words are in another class, first %s: the first expression that matches counts", off,
+             words, example);
 }
 
 /* All 21845 words of up to 7 letters over DGSV between L and E. */
 static void expressions(void)
 {
-    static const char *const alone[] = {
-        "LE", "L(S|D)*DDE", "LS+DE", "LDS?E", "L.*E", "L[SD]+DS+E", "LD*S*G*E", "L(DS)*E", "L(D(S|G)*)+E", "L((D|S)(G|V))*E", "L(D|)E", "L(|S)+DE", "L(D?S?)*VE",
-        "L.?.?.?E", "L[DGSV]+E", "L(D+S)?(G*V)+E", "LD+?E", "LD?+E", "LD*+E", "L(D*)*E", "L((D))E", "(LDE|LSE|LVE)", "LDE|LS*E", "L(D|DS|DSD)*E", "L(.V)*.E", "(L)(D)(E)",
-        "L[D]E", "L.*V.*E", "L(.*D.*D.*)E", "L(S|SS)+E", "L()DE", "L(()|D)+()E", "[L]D[E]", "DE", "LD", "L.L.E", "E", "LDEE", "(L|D)SE", "[LD]+SE", "L((((((((D))))))))*E"};
-    static const char *const lists[][6] = {{"LDE", "L.E", "L..E", "L.*E", NULL, NULL}, {"L.*E", "LDE", NULL, NULL, NULL, NULL}, {"LD*E", "L(D|S)*E", "LS*E", "L.*VE", "L.*", NULL},
-                                           {"LS+DE", "L[SD]+DE", "L.*DE", "LE", NULL, NULL}, {"LDE", "LDE", "LSE", NULL, NULL, NULL}, {"L.*DE", "L.*SE", "L.*GE", "L.*VE", "LE", NULL}};
+    static const char *const alone[] = {"LE",
+                                        "L(S|D)*DDE",
+                                        "LS+DE",
+                                        "LDS?E",
+                                        "L.*E",
+                                        "L[SD]+DS+E",
+                                        "LD*S*G*E",
+                                        "L(DS)*E",
+                                        "L(D(S|G)*)+E",
+                                        "L((D|S)(G|V))*E",
+                                        "L(D|)E",
+                                        "L(|S)+DE",
+                                        "L(D?S?)*VE",
+                                        "L.?.?.?E",
+                                        "L[DGSV]+E",
+                                        "L(D+S)?(G*V)+E",
+                                        "LD+?E",
+                                        "LD?+E",
+                                        "LD*+E",
+                                        "L(D*)*E",
+                                        "L((D))E",
+                                        "(LDE|LSE|LVE)",
+                                        "LDE|LS*E",
+                                        "L(D|DS|DSD)*E",
+                                        "L(.V)*.E",
+                                        "(L)(D)(E)",
+                                        "L[D]E",
+                                        "L.*V.*E",
+                                        "L(.*D.*D.*)E",
+                                        "L(S|SS)+E",
+                                        "L()DE",
+                                        "L(()|D)+()E",
+                                        "[L]D[E]",
+                                        "DE",
+                                        "LD",
+                                        "L.L.E",
+                                        "E",
+                                        "LDEE",
+                                        "(L|D)SE",
+                                        "[LD]+SE",
+                                        "L((((((((D))))))))*E"};
+    static const char *const lists[][6] = {{"LDE", "L.E", "L..E", "L.*E", NULL, NULL},
+                                           {"L.*E", "LDE", NULL, NULL, NULL, NULL},
+                                           {"LD*E", "L(D|S)*E", "LS*E", "L.*VE", "L.*", NULL},
+                                           {"LS+DE", "L[SD]+DE", "L.*DE", "LE", NULL, NULL},
+                                           {"LDE", "LDE", "LSE", NULL, NULL, NULL},
+                                           {"L.*DE", "L.*SE", "L.*GE", "L.*VE", "LE", NULL}};
     size_t i;
     int n;
     for (i = 0; i < sizeof alone / sizeof alone[0]; i++) check_list(&alone[i], 1, 21845);
     for (i = 0; i < sizeof lists / sizeof lists[0]; i++) {
-        for (n = 0; n < 6 && lists[i][n]; n++) {}
+        for (n = 0; n < 6 && lists[i][n]; n++) {
+        }
         check_list(lists[i], n, 21845);
     }
 }
@@ -701,23 +836,52 @@ static void check_malformed(const char *name, const char *const *list, int count
     const char *error = NULL;
     pt_lpe lpe;
     const pt_result result = pt_lpe_compile(&lpe, list, count, &error);
-    pt_check(result == PT_ERROR_ARGUMENT && error && strstr(error, what) && lpe.class_count == 0 && pt_lpe_compile(&lpe, list, count, NULL) == PT_ERROR_ARGUMENT,
-             label("%s is refused", name), "'%s', sentence '%s'", pt_result_string(result), error ? error : "none");
+    pt_check(result == PT_ERROR_ARGUMENT && error && strstr(error, what) && lpe.class_count == 0 &&
+                 pt_lpe_compile(&lpe, list, count, NULL) == PT_ERROR_ARGUMENT,
+             label("%s is refused", name), "'%s', sentence '%s'", pt_result_string(result),
+             error ? error : "none");
     pt_check(pt_lpe_class(&lpe, "LDE") == -1, "a list that was refused", "has classes");
 }
 
 static void malformed(void)
 {
-    static const struct { const char *text, *what; } bad[] = {
-        {"L(DE", "not closed"}, {"L(D(S)E", "not closed"}, {"L[DE", "not closed"}, {"L[]E", "empty"}, {"L[D*]E", "not closed"}, {"LD)E", "not opened"}, {")", "not opened"}, {"", "empty"},
-        {"()", "empty"}, {"D*", "empty"}, {"LDE|", "empty"}, {"LXE", "letter"}, {"lde", "letter"}, {"L D E", "letter"}, {"*LE", "letter"}, {"L|*E", "letter"}, {"LD{2}E", "letter"}, {"L\xff" "E", "letter"}, {NULL, "empty"}};
-    static const char *const seventeen[17] = {"LE", "LE", "LE", "LE", "LE", "LE", "LE", "LE", "LE", "LE", "LE", "LE", "LE", "LE", "LE", "LE", "LE"};
-    static const char *const states = "L[DS][DS][DS][DS][DS][DS][DS]D[DS]*E"; /* from the eye: which of the last 8 were D */
+    static const struct {
+        const char *text, *what;
+    } bad[] = {{"L(DE", "not closed"},
+               {"L(D(S)E", "not closed"},
+               {"L[DE", "not closed"},
+               {"L[]E", "empty"},
+               {"L[D*]E", "not closed"},
+               {"LD)E", "not opened"},
+               {")", "not opened"},
+               {"", "empty"},
+               {"()", "empty"},
+               {"D*", "empty"},
+               {"LDE|", "empty"},
+               {"LXE", "letter"},
+               {"lde", "letter"},
+               {"L D E", "letter"},
+               {"*LE", "letter"},
+               {"L|*E", "letter"},
+               {"LD{2}E", "letter"},
+               {"L\377E",
+                "letter"},
+               {NULL, "empty"}};
+    size_t i;
+    for (i = 0; i < sizeof bad / sizeof bad[0]; i++)
+        check_malformed(bad[i].text ? bad[i].text : "NULL", &bad[i].text, 1, bad[i].what);
+}
+
+/* Up to 16 expressions of 64 letters, 32 parentheses deep, with 64 states. */
+static void limits(void)
+{
+    static const char *const seventeen[17] = {"LE", "LE", "LE", "LE", "LE", "LE", "LE", "LE", "LE",
+                                              "LE", "LE", "LE", "LE", "LE", "LE", "LE", "LE"};
+    static const char *const states =
+        "L[DS][DS][DS][DS][DS][DS][DS]D[DS]*E"; /* from the eye: which of the last 8 were D */
     const char *error = NULL, *text;
     char many[128];
     pt_lpe lpe;
-    size_t i;
-    for (i = 0; i < sizeof bad / sizeof bad[0]; i++) check_malformed(bad[i].text ? bad[i].text : "NULL", &bad[i].text, 1, bad[i].what);
     check_malformed("a list of 17", seventeen, 17, "16");
     check_malformed("a list of -1", seventeen, -1, "16");
     check_malformed("a list that is NULL", NULL, 1, "16");
@@ -730,13 +894,22 @@ static void malformed(void)
     check_malformed("65 letters", &text, 1, "64 letters");
     many[60] = 'E';
     many[61] = '\0';
-    pt_check(pt_lpe_compile(&lpe, &text, 1, &error) == PT_OK && pt_lpe_class(&lpe, many) == 0 && pt_lpe_class(&lpe, "LDDDE") == 1, "61 letters", "are refused: %s", error ? error : "");
+    pt_check(pt_lpe_compile(&lpe, &text, 1, &error) == PT_OK && pt_lpe_class(&lpe, many) == 0 &&
+                 pt_lpe_class(&lpe, "LDDDE") == 1,
+             "61 letters", "are refused: %s", error ? error : "");
     memset(many, '(', 33);
     strcpy(many + 33, "LE)))))))))))))))))))))))))))))))))");
     check_malformed("33 parentheses", &text, 1, "deep");
-    check_malformed("33 parentheses in the second expression", (const char *const[]){"LE", many}, 2, "deep");
-    pt_check(pt_lpe_compile(&lpe, seventeen, 16, NULL) == PT_OK && lpe.class_count == 17 && pt_lpe_class(&lpe, "LE") == 0, "a list of 16", "is refused");
-    pt_check(pt_lpe_compile(&lpe, NULL, 0, NULL) == PT_OK && lpe.class_count == 1 && pt_lpe_class(&lpe, "LDE") == 0, "an empty list", "is not one class of everything");
+    memset(many, '(', 32);
+    strcpy(many + 32, "LE))))))))))))))))))))))))))))))))");
+    pt_check(pt_lpe_compile(&lpe, &text, 1, &error) == PT_OK && pt_lpe_class(&lpe, "LE") == 0,
+             "32 parentheses", "are refused: %s", error ? error : "");
+    pt_check(pt_lpe_compile(&lpe, seventeen, 16, NULL) == PT_OK && lpe.class_count == 17 &&
+                 pt_lpe_class(&lpe, "LE") == 0,
+             "a list of 16", "is refused");
+    pt_check(pt_lpe_compile(&lpe, NULL, 0, NULL) == PT_OK && lpe.class_count == 1 &&
+                 pt_lpe_class(&lpe, "LDE") == 0,
+             "an empty list", "is not one class of everything");
 }
 
 /* Random text never crashes; what is accepted means what our matcher says. */
@@ -750,22 +923,40 @@ static void random_text(void)
         const int n = (int)(pt_pcg32_next(&rng) % 20), hostile = i % 8 == 0;
         const char *list = text;
         pt_lpe lpe;
-        for (k = 0; k < n; k++) text[k] = hostile ? (char)(1 + pt_pcg32_next(&rng) % 255) : letters[pt_pcg32_next(&rng) % (sizeof letters - 1)];
+        for (k = 0; k < n; k++)
+            text[k] = hostile ? (char)(1 + pt_pcg32_next(&rng) % 255)
+                              : letters[pt_pcg32_next(&rng) % (sizeof letters - 1)];
         text[n] = '\0';
         if (pt_lpe_compile(&lpe, &list, 1, NULL) != PT_OK) continue;
         accepted++;
         off += words_off(&lpe, &list, 1, 341, example) > 0; /* up to 4 letters */
     }
-    pt_check(off == 0 && accepted > 1000, "random expressions", "%d of %d accepted ones sort words wrongly, for example %s", off, accepted, example);
+    pt_check(off == 0 && accepted > 1000, "random expressions",
+             "%d of %d accepted ones sort words wrongly, for example %s", off, accepted, example);
 }
 
 static void bad_words(void)
 {
-    static const char *const bad[14] = {"", "L", "E", "DE", "LD", "LXE", "lde", "LLE", "LEE", "ELE", " LE", "LE ", "L*E", "LD\xe9" "E"};
+    static const char *const bad[14] = {"",
+                                        "L",
+                                        "E",
+                                        "DE",
+                                        "LD",
+                                        "LXE",
+                                        "lde",
+                                        "LLE",
+                                        "LEE",
+                                        "ELE",
+                                        " LE",
+                                        "LE ",
+                                        "L*E",
+                                        "LD\351E"};
     pt_lpe lpe = one_class("L.*E"), none;
     int i;
     memset(&none, 0, sizeof none);
-    for (i = 0; i < 14; i++) pt_check(pt_lpe_class(&lpe, bad[i]) == -1, label("the word '%s'", bad[i]), "has class %d", pt_lpe_class(&lpe, bad[i]));
+    for (i = 0; i < 14; i++)
+        pt_check(pt_lpe_class(&lpe, bad[i]) == -1, label("the word '%s'", bad[i]), "has class %d",
+                 pt_lpe_class(&lpe, bad[i]));
     pt_check(pt_lpe_class(&none, "LE") == -1, "classes of nothing", "there are some");
 }
 
@@ -780,35 +971,44 @@ static int row_by_hand(const char *word)
         before_last += i < n - 1 && w[i] != 'S';
     }
     for (i = n - 1; i >= 0 && w[i] == 'S'; i--) tail++;
-    if (n < 2) return n;                                        /* emission, direct                       */
-    if (after_first == 0) return 2;                             /* mirrored light or surface              */
-    if (before_last == 0) return 3;                             /* specular until the last: caustic       */
-    if (w[n - 1] != 'S' && w[n - 2] != 'S') return 4;           /* the last two diffuse: bleeding         */
-    return tail > 0 ? 5 : 6;                                    /* mirrored bleeding or caustic; others   */
+    if (n < 2) return n;                              /* emission, direct                       */
+    if (after_first == 0) return 2;                   /* mirrored light or surface              */
+    if (before_last == 0) return 3;                   /* specular until the last: caustic       */
+    if (w[n - 1] != 'S' && w[n - 2] != 'S') return 4; /* the last two diffuse: bleeding         */
+    return tail > 0 ? 5 : 6;                          /* mirrored bleeding or caustic; others   */
 }
 
 static void slides(void)
 {
-    static const struct { const char *word; int row; } example[] = {
-        {"LE", 0}, {"LDE", 1}, {"LSE", 1}, {"LGE", 1}, {"LDSE", 2}, {"LSSE", 2}, {"LGSSE", 2}, {"LSDE", 3}, {"LSSGE", 3}, {"LDDE", 4}, {"LSDDE", 4}, {"LDGE", 4}, {"LDGDDE", 4},
-        {"LSDSE", 5}, {"LDDSE", 5}, {"LSSDSSE", 5}, {"LDSDE", 6}, {"LSDSDE", 6}, {"LVE", 7}, {"LDVE", 7}, {"LVSDE", 7}};
+    static const struct {
+        const char *word;
+        int row;
+    } example[] = {{"LE", 0},     {"LDE", 1},   {"LSE", 1},   {"LGE", 1},     {"LDSE", 2},  {"LSSE", 2},
+                   {"LGSSE", 2},  {"LSDE", 3},  {"LSSGE", 3}, {"LDDE", 4},    {"LSDDE", 4}, {"LDGE", 4},
+                   {"LDGDDE", 4}, {"LSDSE", 5}, {"LDDSE", 5}, {"LSSDSSE", 5}, {"LDSDE", 6}, {"LSDSDE", 6},
+                   {"LVE", 7},    {"LDVE", 7},  {"LVSDE", 7}};
     pt_lpe lpe;
     char word[16];
     size_t i;
     int k, wrong = 0, count[9] = {0};
-    pt_check(pt_lpe_compile(&lpe, pt_lpe_slides(), PT_LPE_SLIDES_COUNT, NULL) == PT_OK && lpe.class_count == PT_LPE_SLIDES_COUNT + 1, "rows of the slides", "are refused");
+    pt_check(pt_lpe_compile(&lpe, pt_lpe_slides(), PT_LPE_SLIDES_COUNT, NULL) == PT_OK &&
+                 lpe.class_count == PT_LPE_SLIDES_COUNT + 1,
+             "rows of the slides", "are refused");
     for (i = 0; i < sizeof example / sizeof example[0]; i++)
-        pt_check(pt_lpe_class(&lpe, example[i].word) == example[i].row, label("row of %s", example[i].word), "%d, not %d", pt_lpe_class(&lpe, example[i].word), example[i].row);
+        pt_check(pt_lpe_class(&lpe, example[i].word) == example[i].row, label("row of %s", example[i].word),
+                 "%d, not %d", pt_lpe_class(&lpe, example[i].word), example[i].row);
     for (k = 0; k < 9841; k++) { /* up to 8 letters */
         word_of(k, "DGS", word);
         wrong += pt_lpe_class(&lpe, word) != row_by_hand(word);
         count[pt_lpe_class(&lpe, word)]++;
     }
     pt_check(wrong == 0, "rows of the slides for all words of 8 letters", "%d of 9841 differ", wrong);
-    pt_check(count[0] == 1 && count[1] == 3 && count[7] == 0 && count[8] == 0 && count[6] > 0, "rows of the slides", "the rest class holds %d words, 'LE' %d", count[8], count[0]);
+    pt_check(count[0] == 1 && count[1] == 3 && count[7] == 0 && count[8] == 0 && count[6] > 0,
+             "rows of the slides", "the rest class holds %d words, 'LE' %d", count[8], count[0]);
     for (k = 0, wrong = 0; k < 21845; k++) {
         word_of(k, "DGSV", word);
-        wrong += pt_lpe_class(&lpe, word) == 8 || (strchr(word, 'V') != NULL) != (pt_lpe_class(&lpe, word) == 7);
+        wrong +=
+            pt_lpe_class(&lpe, word) == 8 || (strchr(word, 'V') != NULL) != (pt_lpe_class(&lpe, word) == 7);
     }
     pt_check(wrong == 0, "the row of volumes", "%d words of 7 letters are wrong", wrong);
 }
@@ -842,19 +1042,24 @@ static pt_film rendered(const stage *s, const pt_render_desc *d)
     pt_film film = PT_FILM_INIT;
     pt_report report = PT_REPORT_INIT;
     const pt_result result = pt_render(&s->scene, d, &film, &report);
-    pt_check(result == PT_OK && report.nonfinite == 0, "picture with classes", "%s, %s", pt_result_string(result), report.error ? report.error : "");
+    pt_check(result == PT_OK && report.nonfinite == 0, "picture with classes", "%s, %s",
+             pt_result_string(result), report.error ? report.error : "");
     pt_report_free(&report);
     return film;
 }
 
-static int same_sums(const double *a, const double *b, size_t n) { return a && b && memcmp(a, b, n * sizeof *a) == 0; }
+static int same_sums(const double *a, const double *b, size_t n)
+{
+    return a && b && memcmp(a, b, n * sizeof *a) == 0;
+}
 
 /* Both sides are sums of the same non-negative numbers: contributions, divided by shares that add up to 1. A sum of n such terms
    is off by n 2^-53 of itself at most. Per pixel: 8 samples, 2 contributions an edge, at most 64 states each; the shares are
    products over 6 edges, of 3 roundings each. */
 static void classes_add_up(void)
 {
-    static const char *const method[4] = {"path", "path-light", "path-plain", "distribution"}, *const name[3] = {"cornell-spheres", "glossy-box", "materials"};
+    static const char *const method[4] = {"path", "path-light", "path-plain", "distribution"},
+                             *const name[3] = {"cornell-spheres", "glossy-box", "materials"};
     const pt_lpe lpe = slides_lpe();
     const double bound = (8.0 * 2 * 6 * lpe.state_count + 6 * 3 + lpe.class_count) * 0x1p-53;
     int m, k;
@@ -873,11 +1078,14 @@ static void classes_add_up(void)
                 worst = fmax(worst, fabs(sum - whole) / fmax(whole, 1e-300));
                 light += whole;
             }
-            pt_check(film.class_count == PT_LPE_SLIDES_COUNT + 1 && worst <= bound && light > 0, label("classes of %s, %s", name[k], method[m]),
-                     "%d classes; their sum is off by %.3g of the whole, %.3g is rounding", film.class_count, worst, bound);
+            pt_check(film.class_count == PT_LPE_SLIDES_COUNT + 1 && worst <= bound && light > 0,
+                     label("classes of %s, %s", name[k], method[m]),
+                     "%d classes; their sum is off by %.3g of the whole, %.3g is rounding", film.class_count,
+                     worst, bound);
             d.li.lpe = NULL;
             plain = rendered(&s, &d);
-            pt_check(same_sums(plain.half[0], film.half[0], n) && same_sums(plain.half[1], film.half[1], n), label("%s, %s with and without classes", name[k], method[m]),
+            pt_check(same_sums(plain.half[0], film.half[0], n) && same_sums(plain.half[1], film.half[1], n),
+                     label("%s, %s with and without classes", name[k], method[m]),
                      "the picture differs: asking for classes may change no bit of it");
             pt_film_free(&plain);
             pt_film_free(&film);
@@ -888,7 +1096,9 @@ static void classes_add_up(void)
 static int same_classes(const pt_film *a, const pt_film *b)
 {
     const size_t n = 3 * (size_t)a->width * (size_t)a->height;
-    return a->class_count == b->class_count && same_sums(a->classes, b->classes, n * (size_t)a->class_count) && same_sums(a->half[0], b->half[0], n) && same_sums(a->half[1], b->half[1], n);
+    return a->class_count == b->class_count &&
+           same_sums(a->classes, b->classes, n * (size_t)a->class_count) &&
+           same_sums(a->half[0], b->half[0], n) && same_sums(a->half[1], b->half[1], n);
 }
 
 /* Threads, tiles, a continued render: the same bits; a merge: the same up to the rounding of one more addition. */
@@ -909,14 +1119,16 @@ static void films_with_classes(void)
     d.spp = 3;
     other = rendered(&s, &d);
     d.spp = 8;
-    pt_check(pt_render(&s.scene, &d, &other, NULL) == PT_OK && same_classes(&film, &other), "classes of a continued render", "differ");
+    pt_check(pt_render(&s.scene, &d, &other, NULL) == PT_OK && same_classes(&film, &other),
+             "classes of a continued render", "differ");
     pt_film_free(&other);
     d.spp = 4;
     other = rendered(&s, &d);
     d.first_sample = 4;
     second = rendered(&s, &d);
     pt_check(pt_film_merge(&other, &second) == PT_OK, "merging films with classes", "is refused");
-    for (i = 0; i < n; i++) worst = fmax(worst, fabs(other.classes[i] - film.classes[i]) / fmax(film.classes[i], 1e-300));
+    for (i = 0; i < n; i++)
+        worst = fmax(worst, fabs(other.classes[i] - film.classes[i]) / fmax(film.classes[i], 1e-300));
     pt_check(worst <= 8 * 0x1p-53, "classes of merged films", "off by %.3g", worst);
     pt_film_free(&second);
     pt_film_free(&other);
@@ -930,31 +1142,45 @@ static void classes_refused(void)
     const pt_lpe lpe = slides_lpe(), fewer = one_class("LDE");
     pt_lpe none;
     stage s = stage_of("furnace");
-    pt_render_desc d = desc_of(&s, &lpe, "path"), without = desc_of(&s, NULL, "path"), another = desc_of(&s, &fewer, "path");
+    pt_render_desc d = desc_of(&s, &lpe, "path"), without = desc_of(&s, NULL, "path"),
+                   another = desc_of(&s, &fewer, "path");
     pt_film film = rendered(&s, &d), plain, empty = PT_FILM_INIT, out = PT_FILM_INIT;
     pt_report report = PT_REPORT_INIT;
     int k;
     memset(&none, 0, sizeof none);
     without.spp = another.spp = 16;
-    pt_check(pt_render(&s.scene, &without, &film, &report) == PT_ERROR_MISMATCH && report.error, "continuing without classes", "is not refused");
-    pt_check(pt_render(&s.scene, &another, &film, NULL) == PT_ERROR_MISMATCH, "continuing with other classes", "is not refused");
+    pt_check(pt_render(&s.scene, &without, &film, &report) == PT_ERROR_MISMATCH && report.error,
+             "continuing without classes", "is not refused");
+    pt_check(pt_render(&s.scene, &another, &film, NULL) == PT_ERROR_MISMATCH, "continuing with other classes",
+             "is not refused");
     without.first_sample = 8;
     without.spp = 8;
     plain = rendered(&s, &without);
     plain.fingerprint = film.fingerprint; /* the classes alone must tell them apart */
-    pt_check(pt_film_merge(&film, &plain) == PT_ERROR_MISMATCH, "merging films with and without classes", "is not refused");
+    pt_check(pt_film_merge(&film, &plain) == PT_ERROR_MISMATCH, "merging films with and without classes",
+             "is not refused");
     for (k = 0; k < 3; k++) {
         d.method = names[k];
-        pt_check(pt_render(&s.scene, &d, &empty, &report) == PT_ERROR_ARGUMENT && report.error && strstr(report.error, "classes"), label("classes of %s", names[k]), "are not refused");
+        pt_check(pt_render(&s.scene, &d, &empty, &report) == PT_ERROR_ARGUMENT && report.error &&
+                     strstr(report.error, "classes"),
+                 label("classes of %s", names[k]), "are not refused");
     }
     d.method = "path";
     d.li.lpe = &none;
-    pt_check(pt_render(&s.scene, &d, &empty, &report) == PT_ERROR_ARGUMENT && report.error && strstr(report.error, "compiled"), "a list that was not compiled", "is not refused");
-    pt_check(pt_film_class(&film, -1, &out) == PT_ERROR_ARGUMENT && pt_film_class(&film, film.class_count, &out) == PT_ERROR_ARGUMENT && pt_film_class(&plain, 0, &out) == PT_ERROR_ARGUMENT,
+    pt_check(pt_render(&s.scene, &d, &empty, &report) == PT_ERROR_ARGUMENT && report.error &&
+                 strstr(report.error, "compiled"),
+             "a list that was not compiled", "is not refused");
+    pt_check(pt_film_class(&film, -1, &out) == PT_ERROR_ARGUMENT &&
+                 pt_film_class(&film, film.class_count, &out) == PT_ERROR_ARGUMENT &&
+                 pt_film_class(&plain, 0, &out) == PT_ERROR_ARGUMENT,
              "a class that is not there", "is given");
-    pt_check(pt_film_class(&film, 1, &out) == PT_OK && fabs(pt_film_pixel(&out, 3, 2).g - film.classes[3 * (140 + 2 * 14 + 3) + 1] / 8) < 1e-15 && pt_film_spp(&out) == 8, "pt_film_class",
-             "is not the mean of the class");
-    pt_check(pt_film_make_classes(&empty, 3) == PT_ERROR_ARGUMENT && pt_film_make_classes(&out, 0) == PT_ERROR_ARGUMENT, "classes of an empty film", "are made");
+    pt_check(pt_film_class(&film, 1, &out) == PT_OK &&
+                 fabs(pt_film_pixel(&out, 3, 2).g - film.classes[3 * (140 + 2 * 14 + 3) + 1] / 8) < 1e-15 &&
+                 pt_film_spp(&out) == 8,
+             "pt_film_class", "is not the mean of the class");
+    pt_check(pt_film_make_classes(&empty, 3) == PT_ERROR_ARGUMENT &&
+                 pt_film_make_classes(&out, 0) == PT_ERROR_ARGUMENT,
+             "classes of an empty film", "are made");
     pt_film_free(&film);
     pt_film_free(&plain);
     pt_film_free(&empty);
@@ -971,11 +1197,14 @@ enum { MIXED, MATT, GLOSSY };
 static pt_scene corner(int floor_kind, int wall_kind)
 {
     pt_scene s = PT_SCENE_INIT;
-    const pt_material f = pt_material_phong(grey(floor_kind == GLOSSY ? 0 : 0.4), grey(floor_kind == MATT ? 0 : 0.5), 12);
-    const pt_material w = pt_material_phong(grey(wall_kind == GLOSSY ? 0 : 0.5), grey(wall_kind == MATT ? 0 : 0.4), 6);
+    const pt_material f =
+        pt_material_phong(grey(floor_kind == GLOSSY ? 0 : 0.4), grey(floor_kind == MATT ? 0 : 0.5), 12);
+    const pt_material w =
+        pt_material_phong(grey(wall_kind == GLOSSY ? 0 : 0.5), grey(wall_kind == MATT ? 0 : 0.4), 6);
     pt_add_parallelogram(&s, v3(-2, 0, -2), v3(0, 0, 4), v3(4, 0, 0), pt_add_material(&s, f));
     pt_add_parallelogram(&s, v3(-2, 0, -2), v3(4, 0, 0), v3(0, 3, 0), pt_add_material(&s, w));
-    pt_add_parallelogram(&s, v3(-1, 2.5, -1.5), v3(2, 0, 0), v3(0, 0, 2), pt_add_material(&s, pt_material_emitter(grey(6))));
+    pt_add_parallelogram(&s, v3(-1, 2.5, -1.5), v3(2, 0, 0), v3(0, 0, 2),
+                         pt_add_material(&s, pt_material_emitter(grey(6))));
     return committed(s);
 }
 
@@ -990,7 +1219,8 @@ static experiment corner_experiment(const pt_scene *scene, const pt_lpe *lpe, co
 /* One bounce: LDE and LGE of the mixture against floors with one lobe; LDE also by Lambert's formula. */
 static void one_bounce_classes(void)
 {
-    static const char *const words[2] = {"LDE", "LGE"}, *const method[3] = {"path", "path-plain", "path-light"};
+    static const char *const words[2] = {"LDE", "LGE"}, *const method[3] = {"path", "path-plain",
+                                                                            "path-light"};
     static const uint32_t n[3] = {600, 4000, 1200};
     const pt_vec3 lamp[4] = {v3(-1, 2.5, -1.5), v3(1, 2.5, -1.5), v3(1, 2.5, 0.5), v3(-1, 2.5, 0.5)};
     pt_scene mixed = corner(MIXED, MATT);
@@ -1000,14 +1230,19 @@ static void one_bounce_classes(void)
     for (k = 0; k < 2; k++) {
         pt_scene pure = corner(k == 0 ? MATT : GLOSSY, MATT);
         for (m = 0; m < 3; m++) {
-            experiment a = corner_experiment(&mixed, &lpe, method[m], 2), b = corner_experiment(&pure, NULL, "path", 2);
+            experiment a = corner_experiment(&mixed, &lpe, method[m], 2),
+                       b = corner_experiment(&pure, NULL, "path", 2);
             pt_stats sa, sb;
             a.which = k;
             sa = by_means(&a, 150 + (uint64_t)(4 * m + k), n[m]);
             sb = by_means(&b, 170 + (uint64_t)(4 * m + k), 600);
-            pt_check_equal_means(label("%s of a mixture, %s", words[k], method[m]), &sa, &sb, 0.04, "a direction belongs to both lobes, by their parts of the BSDF, whichever lobe drew it");
+            pt_check_equal_means(
+                label("%s of a mixture, %s", words[k], method[m]), &sa, &sb, 0.04,
+                "a direction belongs to both lobes, by their parts of the BSDF, whichever lobe drew it");
             if (k == 0)
-                pt_check_mean(label("LDE in closed form, %s", method[m]), &sa, 0.4 / PT_PI * pt_irradiance_polygon(6, v3(0.1, 0, 0.2), v3(0, 1, 0), lamp, 4), 1e-6, 0.04, PT_TEST_MEANS,
+                pt_check_mean(label("LDE in closed form, %s", method[m]), &sa,
+                              0.4 / PT_PI * pt_irradiance_polygon(6, v3(0.1, 0, 0.2), v3(0, 1, 0), lamp, 4),
+                              1e-6, 0.04, PT_TEST_MEANS,
                               "albedo / pi times the irradiance of the lamp by Lambert's formula");
         }
         pt_scene_free(&pure);
@@ -1027,12 +1262,15 @@ static void two_bounce_classes(void)
     pt_check(pt_lpe_compile(&lpe, words, 4, NULL) == PT_OK, "words of two bounces", "are refused");
     for (k = 0; k < 4; k++) {
         pt_scene pure = corner(k < 2 ? MATT : GLOSSY, k % 2 ? GLOSSY : MATT);
-        experiment a = corner_experiment(&mixed, &lpe, "path", 3), b = corner_experiment(&pure, &all, "path", 3);
+        experiment a = corner_experiment(&mixed, &lpe, "path", 3),
+                   b = corner_experiment(&pure, &all, "path", 3);
         pt_stats sa, sb;
         a.which = k;
         sa = by_means(&a, 190 + 2 * (uint64_t)k, n[k]);
         sb = by_means(&b, 191 + 2 * (uint64_t)k, n[k]);
-        pt_check_equal_means(label("%s of two mixtures", words[k]), &sa, &sb, 0.05, "what a direction carries on is divided by the lobes' parts of the BSDF at that direction");
+        pt_check_equal_means(
+            label("%s of two mixtures", words[k]), &sa, &sb, 0.05,
+            "what a direction carries on is divided by the lobes' parts of the BSDF at that direction");
         pt_scene_free(&pure);
     }
     pt_scene_free(&mixed);
@@ -1058,6 +1296,7 @@ int main(int argc, char **argv)
     PT_TEST_EXACT(distribution_words);
     PT_TEST_EXACT(expressions);
     PT_TEST_EXACT(malformed);
+    PT_TEST_EXACT(limits);
     PT_TEST_EXACT(random_text);
     PT_TEST_EXACT(bad_words);
     PT_TEST_EXACT(slides);
