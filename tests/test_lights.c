@@ -574,7 +574,8 @@ static void sky_hot_pixel(void)
 /* The mean over the sphere that pt_light holds, and that of a constant image: the constant. */
 static void sky_mean(void)
 {
-    sky s = sky_make(64, 32, 1), one = sky_make(7, 5, 0);
+    sky s = sky_make(64, 32, 3),
+        one = sky_make(7, 5, 0); /* not a linear gradient: its plain mean is the same */
     pt_scene scene = under(&s, 2, 0), constant = under(&one, 3, 0);
     double sum = 0;
     int x, y;
