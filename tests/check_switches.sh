@@ -91,6 +91,61 @@ cat > "$dir/hooks_two.c" << 'END'
 #include "pathtracer.h"
 END
 
+# A scene or a render that needs what the switch SWITCH left out: an error that names the switch, not another
+# picture. Compiled with the switch and run. Materials are made by hand, as their constructors are gone too.
+cat > "$dir/needs.c" << 'END'
+#define PATHTRACER_IMPLEMENTATION
+#include "pathtracer.h"
+#include <stdlib.h>
+static int failures;
+static void refused(int refuses, const char *what, const char *sentence)
+{
+    if (refuses && sentence && strstr(sentence, SWITCH)) return;
+    printf("%s: %s\n", what, sentence ? sentence : "no sentence");
+    failures++;
+}
+static void material(pt_material_kind kind, double roughness, const char *what)
+{
+    pt_scene scene = PT_SCENE_INIT;
+    pt_result result;
+    pt_material m;
+    int id;
+    memset(&m, 0, sizeof m);
+    m.kind = kind;
+    m.roughness = (pt_real)roughness;
+    m.exponent = 10;
+    m.eta = pt_rgb_grey(1);
+    id = pt_add_material(&scene, m);
+    result = pt_commit(&scene);
+    refused(id == -1 && result == PT_ERROR_LEFT_OUT, what, pt_scene_error(&scene));
+    pt_scene_free(&scene);
+}
+static void method(const char *name)
+{
+    pt_scene scene = PT_SCENE_INIT;
+    pt_film film = PT_FILM_INIT;
+    pt_report report = PT_REPORT_INIT;
+    pt_render_desc d = pt_render_defaults();
+    pt_result result;
+    d.camera = pt_camera_look_at(pt_v3(0, 0, 0), pt_v3(0, 0, -1), pt_v3(0, 1, 0), 40);
+    d.width = d.height = 1;
+    d.method = name;
+    if (pt_commit(&scene) != PT_OK) exit(1);
+    result = pt_render(&scene, &d, &film, &report);
+    refused(result != PT_OK, name, report.error);
+    pt_film_free(&film);
+    pt_report_free(&report);
+    pt_scene_free(&scene);
+}
+int main(void)
+{
+    (void)material;
+    (void)method;
+    NEEDS
+    return failures != 0;
+}
+END
+
 # ---- compiling -----------------------------------------------------------------------------------
 
 # try LABEL COMMAND...: the command must succeed and say nothing. Runs in the background; collect ends
@@ -236,10 +291,19 @@ symbols()
         'fopen|fwrite|f?puts|f?putc|fclose|f?printf|sn?printf|remove|rename|pt_report_print|pt_write_.*'
     gone PT_NO_FILES -DPT_NO_FILES 'fopen|fclose|remove|rename|pt_write_.*|pt_report_write_.*'
     gone PT_NO_BVH -DPT_NO_BVH 'pti?_bvh_.*'
-    gone PT_NO_ENVIRONMENT -DPT_NO_ENVIRONMENT 'pt_set_environment'
+    gone PT_NO_ENVIRONMENT -DPT_NO_ENVIRONMENT 'pt_set_environment.*|pt_environment_radiance|pti_map_.*|pt_scene_pool'
+    gone PT_NO_MICROFACET -DPT_NO_MICROFACET \
+        'pt_material_(conductor|rough_dielectric|oren_nayar)|pti?_ggx_.*|pt_fresnel_conductor|pti_(eval|pdf|sample)_microfacet'
+    gone PT_NO_PHONG -DPT_NO_PHONG 'pt_material_(phong|blinn)|pti_.*phong.*'
+    gone PT_NO_COAT -DPT_NO_COAT 'pt_material_coat|pti_.*coat.*'
+    gone PT_NO_MEASURED -DPT_NO_MEASURED 'pt_material_measured|pt_measured_.*|pti_merl_.*'
+    gone PT_NO_TEXTURES -DPT_NO_TEXTURES 'pt_texture_eval|pti_texel|pti_check_texture|pt_scene_materials'
+    gone PT_NO_WHITTED -DPT_NO_WHITTED 'pt_li_(local|whitted|distribution|branching)|pti_whitted_.*|pti_solve'
+    gone PT_NO_LPE -DPT_NO_LPE 'pt_lpe_.*|pti_lpe_.*|pti_parse_.*|pti_classify|pti_advance'
     gone PT_NO_REPORT -DPT_NO_REPORT 'pt_report_print|pt_report_write_.*'
     gone PT_NO_SCENES -DPT_NO_SCENES 'pt_scenes|pt_scene_find|pt_scene_cornell.*|pt_cornell_.*'
-    gone PT_ONLY_PATH -DPT_ONLY_PATH 'pt_li_path_plain|pt_li_path_light|pt_scenes|pt_scene_cornell'
+    gone PT_ONLY_PATH -DPT_ONLY_PATH \
+        'pt_li_(path_plain|path_light|local|whitted|distribution|branching)|pt_lpe_.*|pt_scenes|pt_scene_cornell'
     object static one.c -DPT_STATIC && none 'PT_STATIC: nothing is public' 't == "T"' static
     object hooks hooks.c && none 'own memory functions: malloc and its kin are gone' \
         's ~ /^(malloc|calloc|realloc|free)$/' hooks
@@ -270,6 +334,30 @@ refusals()
     fi
 }
 
+# names SWITCH NEEDS: what the statements NEEDS ask for is refused with a sentence that names the switch
+names()
+{
+    if ! $CC -std=c99 -O0 -I. "-D$1" "-DSWITCH=\"$1\"" "-DNEEDS=$2" "$dir/needs.c" -o "$dir/needs" -lm -pthread > "$dir/needs.out" 2>&1; then
+        bad "$1: the program that needs it does not compile"
+        head -n 5 "$dir/needs.out"
+    elif "$dir/needs" > "$dir/needs.out" 2>&1; then
+        ok "$1: what needs it is refused, and the sentence names the switch"
+    else
+        bad "$1: $(tr '\n' ';' < "$dir/needs.out")"
+    fi
+}
+
+left_out()
+{
+    names PT_NO_MICROFACET 'material(PT_MATERIAL_CONDUCTOR, 0, "metal"); material(PT_MATERIAL_CONDUCTOR, 0.5, "rough metal");
+        material(PT_MATERIAL_DIELECTRIC, 0.5, "rough glass"); material(PT_MATERIAL_OREN_NAYAR, 0.3, "Oren-Nayar");'
+    names PT_NO_PHONG 'material(PT_MATERIAL_PHONG, 0, "Phong"); material(PT_MATERIAL_BLINN, 0, "Blinn-Phong");'
+    names PT_NO_COAT 'material(PT_MATERIAL_COAT, 0, "coat");'
+    names PT_NO_MEASURED 'material(PT_MATERIAL_MEASURED, 0, "measured");'
+    names PT_NO_WHITTED 'method("local"); method("whitted"); method("distribution"); method("branching");'
+    names PT_ONLY_PATH 'method("path-light"); method("path-plain");'
+}
+
 # ---- the two forms -------------------------------------------------------------------------------
 
 short_form()
@@ -285,6 +373,7 @@ short_form()
     refusals
     collect
     symbols
+    left_out
 }
 
 c_compiler() # COMPILER
@@ -334,6 +423,7 @@ full_form()
     refusals
     collect
     symbols
+    left_out
 }
 
 case $mode in

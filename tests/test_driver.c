@@ -922,7 +922,7 @@ static void methods(void)
     int count, i;
     const pt_method *const m = pt_methods(&count);
     stage s = stage_of("furnace");
-    pt_check(count == 3 && pt_method_find(NULL) == m && strcmp(m[0].name, "path") == 0, "table of methods",
+    pt_check(count == 7 && pt_method_find(NULL) == m && strcmp(m[0].name, "path") == 0, "table of methods",
              "%d methods, first %s", count, m[0].name);
     pt_check(pt_method_find("no such method") == NULL && pt_method_find("") == NULL, "unknown method",
              "is found");
