@@ -91,6 +91,27 @@ cat > "$dir/hooks_two.c" << 'END'
 #include "pathtracer.h"
 END
 
+# What a scene says when it asks for what was left out; one line for each kind of material.
+cat > "$dir/left_out.c" << 'END'
+#define PATHTRACER_IMPLEMENTATION
+#include "pathtracer.h"
+int main(void)
+{
+    int kind;
+    for (kind = PT_MATERIAL_DIELECTRIC; kind <= PT_MATERIAL_MEASURED; kind++) {
+        pt_scene scene = PT_SCENE_INIT;
+        pt_material m;
+        memset(&m, 0, sizeof m);
+        m.kind = (pt_material_kind)kind;
+        m.roughness = (pt_real)0.5;
+        pt_add_material(&scene, m);
+        printf("%d %d %s\n", kind, (int)pt_commit(&scene) == (int)PT_ERROR_LEFT_OUT, pt_scene_error(&scene));
+        pt_scene_free(&scene);
+    }
+    return 0;
+}
+END
+
 # ---- compiling -----------------------------------------------------------------------------------
 
 # try LABEL COMMAND...: the command must succeed and say nothing. Runs in the background; collect ends
@@ -237,12 +258,37 @@ symbols()
     gone PT_NO_FILES -DPT_NO_FILES 'fopen|fclose|remove|rename|pt_write_.*|pt_report_write_.*'
     gone PT_NO_BVH -DPT_NO_BVH 'pti?_bvh_.*'
     gone PT_NO_ENVIRONMENT -DPT_NO_ENVIRONMENT 'pt_set_environment'
+    gone PT_NO_MICROFACET -DPT_NO_MICROFACET \
+        'pt_ggx_.*|pti_ggx_.*|pt_fresnel_conductor|pt_material_(conductor|rough_dielectric|oren_nayar)'
+    gone PT_NO_PHONG -DPT_NO_PHONG 'pt_material_(phong|blinn)|pti_.*_phong'
+    gone PT_NO_COAT -DPT_NO_COAT 'pt_material_coat|pti_.*_coat'
+    gone PT_NO_MEASURED -DPT_NO_MEASURED 'pt_measured_.*|pti_merl_.*|pt_material_measured'
+    gone PT_NO_TEXTURES -DPT_NO_TEXTURES 'pt_texture_eval|pti_texel|pti_hit_uv'
     gone PT_NO_REPORT -DPT_NO_REPORT 'pt_report_print|pt_report_write_.*'
     gone PT_NO_SCENES -DPT_NO_SCENES 'pt_scenes|pt_scene_find|pt_scene_cornell.*|pt_cornell_.*'
     gone PT_ONLY_PATH -DPT_ONLY_PATH 'pt_li_path_plain|pt_li_path_light|pt_scenes|pt_scene_cornell'
     object static one.c -DPT_STATIC && none 'PT_STATIC: nothing is public' 't == "T"' static
     object hooks hooks.c && none 'own memory functions: malloc and its kin are gone' \
         's ~ /^(malloc|calloc|realloc|free)$/' hooks
+}
+
+# A material that was left out is refused with the name of the switch.
+sentences()
+{
+    if ! $CC -std=c99 -O0 -I. -DPT_NO_MICROFACET -DPT_NO_PHONG -DPT_NO_COAT -DPT_NO_MEASURED "$dir/left_out.c" \
+        -o "$dir/left_out" -lm -pthread 2> "$dir/left_out.out" || ! "$dir/left_out" > "$dir/left_out.txt"; then
+        bad 'left-out materials: does not compile or run'
+        return
+    fi
+    for pair in DIELECTRIC:2:MICROFACET CONDUCTOR:3:MICROFACET OREN_NAYAR:4:MICROFACET PHONG:5:PHONG BLINN:6:PHONG \
+        COAT:7:COAT MEASURED:8:MEASURED; do
+        kind=${pair#*:}
+        if grep -q "^${kind%:*} 1 material 0: .*PT_NO_${kind#*:}\$" "$dir/left_out.txt"; then
+            ok "${pair%%:*} left out: is refused by the name of PT_NO_${kind#*:}"
+        else
+            bad "${pair%%:*} left out: $(grep "^${kind%:*} " "$dir/left_out.txt")"
+        fi
+    done
 }
 
 # must_fail LABEL TEXT FLAGS...: the compiler refuses, and says so in the header's words
@@ -285,6 +331,7 @@ short_form()
     refusals
     collect
     symbols
+    sentences
 }
 
 c_compiler() # COMPILER
@@ -334,6 +381,7 @@ full_form()
     refusals
     collect
     symbols
+    sentences
 }
 
 case $mode in
