@@ -387,6 +387,7 @@ static void tell(const story *s, uint64_t seed)
     if (pt_bsdf_sample(s->b, s->wo, 0, pt_v2(0, 0), s->mode, &r) && r.lobe == PT_LOBE_SPECULAR) delta = dbl(r.pdf_w);
     expected[CELLS] = fmax(1 - sum.pdf - delta, 0.5 / n);
     expected[CELLS + 1] = delta;
+    for (i = 0; i < CELLS; i++) expected[i] = fmax(expected[i], 1e-7); /* of a cell the horizon cuts, all points may be below */
     for (i = 0, total = 0; i < CELLS + 2; i++) total += expected[i];
     for (i = 0; i < CELLS + 2; i++) expected[i] *= n / total; /* the quadrature's own error */
     pt_check(d.disagree == 0, s->name,
