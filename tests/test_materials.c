@@ -1185,6 +1185,42 @@ static void filled_tables(void)
     pt_check(m.value == NULL, "free table", "keeps its pointer");
 }
 
+/* Bright and dark rings of theta_h in turns. */
+static pt_rgb striped(void *user, pt_vec3 wo, pt_vec3 wi)
+{
+    (void)user;
+    return pt_rgb_grey(merl_part(pt_measured_index(wo, wi), 0) % 2 ? real(0.3) : real(0.003));
+}
+
+/* Half of the directions are drawn by the ring of the half vector. Seen along the normal, those of theta_h below
+   45 degrees, ring 63, lead up. Exact: the table's own cdf, whose steps are bright and dark too. */
+static void table_rings(void)
+{
+    const uint32_t n = pt_test_samples(1u << 16);
+    const pt_vec3 wo = pt_v3(0, 0, 1);
+    pt_measured m = PT_MEASURED_INIT;
+    const pt_material striped_material = pt_material_measured(&m);
+    const pt_bsdf b = upright(&striped_material);
+    pt_pcg32 rng = generator(790);
+    double counts[64] = {0}, expected[64], step = 0;
+    uint32_t i;
+    if (pt_measured_fill(&m, striped, NULL) != PT_OK) return;
+    for (i = 0; i < n; i++) {
+        pt_bsdf_sample_result d;
+        const int got = pt_bsdf_sample(&b, wo, 0.25, pair(&rng), PT_RADIANCE, &d);
+        const int ring = got ? merl_part(pt_measured_index(wo, d.wi), 0) : 63;
+        counts[ring < 63 ? ring : 63]++;
+    }
+    for (i = 0; i < 63; i++) {
+        expected[i] = n * (m.cdf[i + 1] - m.cdf[i]);
+        step = fmax(step, i % 2 ? 0 : expected[i] / n);
+    }
+    expected[63] = n * (1 - m.cdf[63]);
+    pt_check(step < 0.001 && m.cdf[0] <= 0 && m.cdf[90] >= 1, "a striped table", "dark rings have a probability of %g", step);
+    pt_check_chi2("a striped table", counts, expected, 64, "rings are not drawn as often as the table's cdf says");
+    pt_measured_free(&m);
+}
+
 /* Replaces bytes of a file. */
 static void patch(const char *path, long at, const void *bytes, size_t size)
 {
@@ -1653,6 +1689,7 @@ int main(int argc, char **argv)
     PT_TEST_EXACT(no_gain);
     PT_TEST_EXACT(table_index);
     PT_TEST_EXACT(filled_tables);
+    PT_TEST(table_rings);
     PT_TEST_EXACT(table_files);
     PT_TEST_EXACT(tables_without_memory);
     PT_TEST(goniometer);
