@@ -1552,7 +1552,7 @@ PTDEF void pt_image_free(pt_image *image);
 
 #if PTI_HAS_MEASURED
 /* A table as a file in the MERL format: three 32-bit integers 90 90 180, then the three planes as 64-bit floats, all
-   little-endian. Other sizes and truncated files are PT_ERROR_FILE. */
+   little-endian. Other sizes, truncated files, NaN and values beyond 1e30 are PT_ERROR_FILE. */
 PTDEF pt_result pt_measured_write(const char *path, const pt_measured *m);
 PTDEF pt_result pt_measured_read(const char *path, pt_measured *m);
 #endif
@@ -4772,9 +4772,11 @@ PTDEF void pt_measured_free(pt_measured *m)
 
 /* --- the BSDF of a hit --- */
 
+/* A lobe narrower than the rounding of directions is a delta lobe: its density would overflow and nothing could
+   evaluate it. Glass of index 1 does not bend, however rough. */
 static int pti_is_smooth(const pt_material *m)
 {
-    return m->roughness == 0 || (m->kind == PT_MATERIAL_DIELECTRIC && m->ior == 1);
+    return (double)m->roughness * (double)m->roughness < PTI_UNIT_ROUNDOFF || (m->kind == PT_MATERIAL_DIELECTRIC && m->ior == 1);
 }
 
 static double pti_ior(const pt_material *m)
@@ -4826,16 +4828,24 @@ PTI_INLINE pt_real pti_reflection_cosine(const pt_bsdf *b, pt_vec3 wo, pt_vec3 w
     return c > 0 && side * pt_v3_dot(wi, b->ng) > 0 ? c : 0;
 }
 
+/* A density in the working precision. Where both directions graze from opposite sides it can exceed any range; the
+   weight f cos / pdf is then 0 to rounding. */
+static pt_real pti_density(double p)
+{
+    return p < (double)PTI_REAL_MAX ? (pt_real)p : PTI_REAL_MAX;
+}
+
 /* Two directions around the shading normal, mirrored so that wo is above; eta as seen from wo. */
 typedef struct pti_pair {
     pti_d3 o, i;
     double eta;
 } pti_pair;
 
+/* Unit again: a length that was rounded by u is a factor of 1 + n u in cos^n. */
 static pti_d3 pti_to_local(const pt_bsdf *b, pt_vec3 w, double side)
 {
     pti_d3 d = pti_d_from(w);
-    return pti_d(pti_d_dot(d, pti_d_from(b->frame.s)), pti_d_dot(d, pti_d_from(b->frame.t)), side * pti_d_dot(d, pti_d_from(b->frame.n)));
+    return pti_d_normalize(pti_d(pti_d_dot(d, pti_d_from(b->frame.s)), pti_d_dot(d, pti_d_from(b->frame.t)), side * pti_d_dot(d, pti_d_from(b->frame.n))));
 }
 
 /* From the local direction to the world's, on the side of ng that its z says: 0 if the shading normal and the
@@ -4951,7 +4961,7 @@ static int pti_sample_microfacet(const pt_bsdf *b, pt_vec3 wo, double u_lobe, pt
     g = (1 + lo) / (1 + lo + pti_ggx_lambda(p.i, a)); /* f cos / pdf = F G2 / G1 [Hei18] (19) */
     if (p.i.z < 0 && mode == PT_RADIANCE) g /= p.eta * p.eta;
     out->weight = b->material->kind == PT_MATERIAL_CONDUCTOR ? pt_rgb_scale(pti_conductor_fresnel(b, c), (pt_real)g) : pt_rgb_grey((pt_real)g);
-    out->pdf_w = (pt_real)(r * pti_ggx_visible(p.o, h, a) * pti_half_jacobian(&p, h));
+    out->pdf_w = pti_density(r * pti_ggx_visible(p.o, h, a) * pti_half_jacobian(&p, h));
     out->pdf_rev_w = pt_bsdf_pdf_w(b, out->wi, wo, mode == PT_RADIANCE ? PT_IMPORTANCE : PT_RADIANCE);
     out->lobe = PT_LOBE_GLOSSY;
     return out->pdf_w > 0;
@@ -5133,7 +5143,7 @@ PTDEF pt_real pt_bsdf_pdf_w(const pt_bsdf *b, pt_vec3 wo, pt_vec3 wi, pt_transpo
     if (b->material->kind == PT_MATERIAL_DIFFUSE) return pt_warp_cosine_pdf_w(pt_v3(0, 0, pti_reflection_cosine(b, wo, wi)));
     if (!pti_pair_make(b, wo, wi, &p)) return 0;
 #if PTI_HAS_MICROFACET
-    if (b->material->kind == PT_MATERIAL_CONDUCTOR || b->material->kind == PT_MATERIAL_DIELECTRIC) return (pt_real)pti_pdf_microfacet(b, &p);
+    if (b->material->kind == PT_MATERIAL_CONDUCTOR || b->material->kind == PT_MATERIAL_DIELECTRIC) return pti_density(pti_pdf_microfacet(b, &p));
 #endif
     if (p.i.z < 0) return 0;
     switch (b->material->kind) {
@@ -5142,13 +5152,13 @@ PTDEF pt_real pt_bsdf_pdf_w(const pt_bsdf *b, pt_vec3 wo, pt_vec3 wi, pt_transpo
 #endif
 #if PTI_HAS_PHONG
     case PT_MATERIAL_PHONG:
-    case PT_MATERIAL_BLINN: return (pt_real)pti_pdf_phong(b, &p);
+    case PT_MATERIAL_BLINN: return pti_density(pti_pdf_phong(b, &p));
 #endif
 #if PTI_HAS_COAT
     case PT_MATERIAL_COAT: return (pt_real)((1 - pti_coat_share(b, p.o.z)) * p.i.z / PT_PI);
 #endif
 #if PTI_HAS_MEASURED
-    case PT_MATERIAL_MEASURED: return (pt_real)pti_pdf_measured(b, &p);
+    case PT_MATERIAL_MEASURED: return pti_density(pti_pdf_measured(b, &p));
 #endif
     default: return 0;
     }
@@ -7879,6 +7889,12 @@ static int pti_read_pixels(FILE *file, pt_image *image, int kind)
     return 1;
 }
 
+/* Is this the scale of a PFM: a number that is not 0? Its sign tells the byte order, its size nothing. */
+static int pti_is_scale(const char *word)
+{
+    return strspn(word, "+-.0123456789eE") == strlen(word) && strcspn(word, "123456789") < strcspn(word, "eE");
+}
+
 static pt_result pti_read_image(FILE *file, pt_image *image)
 {
     char word[32];
@@ -7890,6 +7906,7 @@ static pt_result pti_read_image(FILE *file, pt_image *image)
     height = pti_read_count(file);
     if (kind < 0 || !pti_image_size_ok(width, height) || !pti_read_word(file, word, sizeof word)) return PT_ERROR_FILE;
     if (kind == 0 && strcmp(word, "255") != 0) return PT_ERROR_FILE;
+    if (kind == 1 && !pti_is_scale(word)) return PT_ERROR_FILE;
     if (kind == 1 && word[0] != '-') kind = 2;
     image->rgb = (float *)pti_alloc(3 * (size_t)width * (size_t)height, sizeof *image->rgb, image->alloc_user);
     if (!image->rgb) return PT_ERROR_MEMORY;
@@ -7942,7 +7959,7 @@ static int pti_merl_read_values(FILE *file, double *value)
         if (fread(b, 1, 8, file) != 8) return 0;
         for (k = 0; k < 8; k++) bits |= (uint64_t)b[k] << (8 * k);
         memcpy(&value[i], &bits, 8);
-        if (!pti_finite(value[i])) return 0;
+        if (!(fabs(value[i]) <= 1e30)) return 0; /* NaN, or no BRDF: sums and floats must hold it */
     }
     return 1;
 }
