@@ -332,7 +332,7 @@ typedef enum pt_result {
     PT_ERROR_LEFT_OUT,      /* the scene or call needs what a PT_NO_X switch left out                      */
     PT_ERROR_CANCELLED,     /* the callback asked to stop; finished passes are in the film                 */
     PT_ERROR_MISMATCH,      /* films that do not belong together, or whose samples overlap                 */
-    PT_ERROR_FILE           /* a file could not be written; nothing stands under its name that is not whole */
+    PT_ERROR_FILE           /* a file could not be read, or not written; then nothing but a whole one has its name */
 } pt_result;
 
 /* The name of a result as a short sentence. Never NULL, also for values outside the enum. */
@@ -910,7 +910,8 @@ PTDEF int pt_measured_index(pt_vec3 wo, pt_vec3 wi);
 PTDEF int pt_measured_directions(int index, pt_vec3 *wo, pt_vec3 *wi);
 /* The value of the cell in 1/sr. */
 PTDEF pt_rgb pt_measured_eval(const pt_measured *m, pt_vec3 wo, pt_vec3 wi);
-/* A virtual gonioreflectometer that knows the BRDF: its value at the centre of each cell. Allocates 35 MB. */
+/* A virtual gonioreflectometer that knows the BRDF: its value at the centre of each cell, which must be finite and not
+   negative. Cells whose centre is below the horizon stay unmeasured. Allocates 35 MB. */
 PTDEF pt_result pt_measured_fill(pt_measured *m, pt_brdf_fn f, void *user);
 /* One that does not, as a real one: it counts what `samples` rays that come in by the cosine scatter into
    each cell, and divides by what a white diffuse standard scatters there. Cells are joined in blocks of
@@ -1849,7 +1850,7 @@ PTDEF const char *pt_result_string(pt_result result)
     case PT_ERROR_LEFT_OUT: return "this needs a feature that a PT_NO_X switch left out";
     case PT_ERROR_CANCELLED: return "cancelled by the callback";
     case PT_ERROR_MISMATCH: return "the films do not belong together";
-    case PT_ERROR_FILE: return "the file could not be written";
+    case PT_ERROR_FILE: return "the file could not be read or written";
     }
     return "unknown result";
 }
@@ -4512,8 +4513,8 @@ static double pti_ggx_d(pti_d3 h, double a)
 
 static double pti_ggx_lambda(pti_d3 w, double a)
 {
-    double t = a * a * (w.x * w.x + w.y * w.y) / (w.z * w.z);
-    return 0.5 * t / (1 + sqrt(1 + t));
+    double t = a * sqrt(w.x * w.x + w.y * w.y) / fabs(w.z);
+    return t < 1e8 ? 0.5 * t * t / (1 + sqrt(1 + t * t)) : 0.5 * (t - 1); /* beyond 2^26 the same to rounding, and no overflow */
 }
 
 /* Density of the visible normals D G1 (o . h) / cos [Hei18] 3, o above. */
@@ -4714,6 +4715,10 @@ PTDEF pt_result pt_measured_fill(pt_measured *m, pt_brdf_fn f, void *user)
         pt_vec3 wo, wi;
         int above = pt_measured_directions(i, &wo, &wi);
         pt_rgb c = above ? f(user, wo, wi) : pt_rgb_grey(0);
+        if (!pti_rgb_finite(c) || !(c.r >= 0 && c.g >= 0 && c.b >= 0)) {
+            pt_measured_free(m);
+            return PT_ERROR_ARGUMENT;
+        }
         pti_merl_set(m, i, above, (double)c.r, (double)c.g, (double)c.b);
     }
     pti_merl_finish(m);
@@ -4968,8 +4973,8 @@ static int pti_sample_microfacet(const pt_bsdf *b, pt_vec3 wo, double u_lobe, pt
 }
 
 /* [Ore94] eq. 30 with sigma in radians: albedo/pi (A + B max(0, cos dphi) sin(a) tan(b)), a and b the larger and
-   the smaller angle. sin a tan b cos dphi = (x x + y y) / max(cos, cos). Its albedo reaches 1.007 of `albedo` at
-   grazing angles: the model is a fit. */
+   the smaller angle. sin a tan b cos dphi = (x x + y y) / max(cos, cos). The model is a fit: its albedo reaches 1.0152
+   times `albedo` at grazing angles, for sigma about 0.2. */
 static pt_rgb pti_eval_oren_nayar(const pt_bsdf *b, const pti_pair *p)
 {
     double s2 = (double)b->material->roughness * (double)b->material->roughness;
@@ -4993,6 +4998,10 @@ static double pti_phong_power(const pt_bsdf *b, const pti_pair *p, double *oh)
         h = pti_d_normalize(pti_d_add(p->o, p->i));
         *oh = pti_d_dot(p->o, h);
         c = h.z;
+        if (!(*oh > 0)) { /* opposite directions, by rounding: no facet sees both */
+            *oh = 1;
+            return 0;
+        }
     }
     return c > 0 ? pow(fmin(1, c), (double)b->material->exponent) : 0;
 }
@@ -5082,7 +5091,7 @@ static double pti_pdf_measured(const pt_bsdf *b, const pti_pair *p)
     pti_d3 h = pti_d_normalize(pti_d_add(p->o, p->i));
     int ring = pti_clamp_int(sqrt(atan2(sqrt(h.x * h.x + h.y * h.y), h.z) * (2 / PT_PI)) * PTI_MERL_H, PTI_MERL_H - 1);
     double ph = (b->material->measured->cdf[ring + 1] - b->material->measured->cdf[ring]) / pti_merl_ring(ring);
-    return 0.5 * p->i.z / PT_PI + 0.5 * ph / (4 * pti_d_dot(p->o, h));
+    return 0.5 * p->i.z / PT_PI + (pti_d_dot(p->o, h) > 0 ? 0.5 * ph / (4 * pti_d_dot(p->o, h)) : 0);
 }
 
 static pti_d3 pti_draw_measured(const pt_bsdf *b, pti_d3 o, pt_vec2 u)
@@ -5888,6 +5897,12 @@ static int pti_check_rgb(pt_scene *scene, const char *item, uint32_t number, con
     return 1;
 }
 
+/* Can a picture of this size be held: up to 65536 pixels a side, and its bytes in a size_t? */
+static int pti_pixels_fit(int width, int height)
+{
+    return width >= 1 && height >= 1 && width <= 65536 && height <= 65536 && (uint64_t)width * (uint64_t)height <= SIZE_MAX / (3 * sizeof(double));
+}
+
 #if PTI_HAS_TEXTURES || PTI_HAS_ENVIRONMENT
 /* 1 if every value is finite and not negative. */
 static int pti_check_pixels(pt_scene *scene, const char *item, uint32_t number, const float *rgb, size_t count, double max)
@@ -5951,7 +5966,7 @@ static int pti_check_texture(pt_scene *scene, uint32_t n, const pt_texture *t)
     if (t->kind == PT_TEXTURE_CHECKER)
         return pti_check_rgb(scene, "material", n, "texture a", t->a, 1) && pti_check_rgb(scene, "material", n, "texture b", t->b, 1);
     if (t->kind == PT_TEXTURE_FUNCTION) return t->function ? 1 : !pti_scene_fail(scene, PT_ERROR_SCENE, "material", n, "texture has no function");
-    if (!t->rgb || t->width < 1 || t->height < 1 || t->width > 65536 || t->height > 65536)
+    if (!t->rgb || !pti_pixels_fit(t->width, t->height))
         return !pti_scene_fail(scene, PT_ERROR_SCENE, "material", n, "texture image is empty or larger than 65536 x 65536");
     return pti_check_pixels(scene, "material", n, t->rgb, 3 * (size_t)t->width * (size_t)t->height, 1);
 }
@@ -6183,10 +6198,11 @@ static pt_rgb pti_map_finish(pt_environment_map *m)
 PTDEF int pt_set_environment_image(pt_scene *scene, const float *rgb, int width, int height, double scale)
 {
     pt_environment_map m;
-    size_t pixels = (size_t)(width > 0 ? width : 0) * (size_t)(height > 0 ? height : 0);
-    if (!rgb || width < 1 || height < 1 || width > 65536 || height > 65536)
+    size_t pixels;
+    if (!rgb || !pti_pixels_fit(width, height))
         return pti_scene_fail(scene, PT_ERROR_ARGUMENT, "environment", 0, "the image is empty or larger than 65536 x 65536");
     if (!(scale >= 0) || !pti_finite(scale)) return pti_scene_fail_value(scene, "environment", 0, "scale", scale, "is negative or not finite");
+    pixels = (size_t)width * (size_t)height;
     if (!pti_check_pixels(scene, "environment", 0, rgb, 3 * pixels, scale > 1 ? (double)PTI_REAL_MAX / scale : HUGE_VAL)) return -1;
     pti_map_free(scene);
     m.width = width;
@@ -7786,16 +7802,11 @@ static pt_result pti_writer_close(pti_writer *w, const char *path)
     return w->failed ? PT_ERROR_FILE : PT_OK;
 }
 
-static int pti_image_size_ok(int width, int height)
-{
-    return width >= 1 && height >= 1 && width <= 65536 && height <= 65536;
-}
-
 PTDEF pt_result pt_write_ppm_bytes(const char *path, const unsigned char *rgb, int width, int height)
 {
     char head[64] = "P6\n";
     pti_writer w;
-    if (!rgb || !pti_image_size_ok(width, height)) return PT_ERROR_ARGUMENT;
+    if (!rgb || !pti_pixels_fit(width, height)) return PT_ERROR_ARGUMENT;
     if (!pti_writer_open(&w, path)) return PT_ERROR_FILE;
     pti_append_integer(head, sizeof head, (uint64_t)width);
     pti_append(head, sizeof head, " ");
@@ -7811,7 +7822,7 @@ PTDEF pt_result pt_write_pfm_floats(const char *path, const float *rgb, int widt
     char head[64] = "PF\n";
     pti_writer w;
     int x, y, k;
-    if (!rgb || !pti_image_size_ok(width, height)) return PT_ERROR_ARGUMENT;
+    if (!rgb || !pti_pixels_fit(width, height)) return PT_ERROR_ARGUMENT;
     if (!pti_writer_open(&w, path)) return PT_ERROR_FILE;
     pti_append_integer(head, sizeof head, (uint64_t)width);
     pti_append(head, sizeof head, " ");
@@ -7904,7 +7915,7 @@ static pt_result pti_read_image(FILE *file, pt_image *image)
     if (strcmp(word, "PF") == 0) kind = 1;
     width = pti_read_count(file);
     height = pti_read_count(file);
-    if (kind < 0 || !pti_image_size_ok(width, height) || !pti_read_word(file, word, sizeof word)) return PT_ERROR_FILE;
+    if (kind < 0 || !pti_pixels_fit(width, height) || !pti_read_word(file, word, sizeof word)) return PT_ERROR_FILE;
     if (kind == 0 && strcmp(word, "255") != 0) return PT_ERROR_FILE;
     if (kind == 1 && !pti_is_scale(word)) return PT_ERROR_FILE;
     if (kind == 1 && word[0] != '-') kind = 2;
@@ -8144,7 +8155,7 @@ static pt_result pti_write_png(const char *path, const unsigned char *rgb, int w
     unsigned char header[13] = {0, 0, 0, 0, 0, 0, 0, 0, 8, 2, 0, 0, 0}; /* 8 bits, RGB */
     pti_writer w;
     pti_bits b;
-    if (!rgb || !pti_image_size_ok(width, height)) return PT_ERROR_ARGUMENT;
+    if (!rgb || !pti_pixels_fit(width, height)) return PT_ERROR_ARGUMENT;
     if (3.4 * width * height > 2147483647.0) return PT_ERROR_ARGUMENT; /* a chunk is shorter than 2^31 */
     if (!pti_png_compress(rgb, width, height, user, &b)) return PT_ERROR_MEMORY;
     if (!pti_writer_open(&w, path)) {
