@@ -148,9 +148,13 @@ test-logs: $(STARTED)
 # Kept for the next run.
 .PRECIOUS: build/test/test_%
 
-build/test/test_%: tests/test_%.c $(wildcard tests/*.h) pathtracer.h build/flags
+build/test/implementation.o: tests/implementation.c pathtracer.h build/flags
 	@mkdir -p build/test
-	$(BUILD_C) -Itests $< -o $@ $(LDLIBS)
+	$(BUILD_C) -c $< -o $@
+
+build/test/test_%: tests/test_%.c $(wildcard tests/*.h) pathtracer.h build/test/implementation.o build/flags
+	@mkdir -p build/test
+	$(BUILD_C) -Itests -DPT_TEST_LINKED $< build/test/implementation.o -o $@ $(LDLIBS)
 
 build/test/test_%.log: build/test/test_% FORCE
 	@sh tests/run.sh one $@ ./$<
@@ -167,6 +171,9 @@ build/bench: tests/bench/bench.c pathtracer.h build/flags
 bench: build/bench
 	@CC='$(CC)' CFLAGS='$(CFLAGS)' build/bench
 
+# 1: all of them; n: every n-th, JOBS of n * JOBS shares.
+SLICES = 1
+
 build/mutants/run: tests/mutants.c build/flags
 	@mkdir -p build/mutants
 	$(BUILD_C) tests/mutants.c -o $@
@@ -178,6 +185,6 @@ mutants: build/mutants/run
 	@rm -f build/mutants/share*.log
 	@for k in $(if $(ONLY),1,$(SHARES)); do \
 	    CC='$(CC)' sh tests/run.sh one build/mutants/share$$k.log build/mutants/run \
-	        $(if $(ONLY),--only $(ONLY),--share $$k/$(JOBS)) --generate $(GENERATED) $(if $(ALL),--all) $(TESTS) & \
+	        $(if $(ONLY),--only $(ONLY),--share $$k/$$(($(JOBS) * $(SLICES)))) --generate $(GENERATED) $(if $(ALL),--all) $(TESTS) & \
 	done; wait
 	@sh tests/run.sh sum build/mutants/share*.log

@@ -1,6 +1,5 @@
 /* pt_test.h: the harness of the tests. A test is a function; one program runs many:
 
-       #define PATHTRACER_IMPLEMENTATION
        #include "pt_test.h"
        static void tails(void) { pt_check_near("normal tail", pt_normal_sf(0), 0.5, 1e-15, ""); }
        int main(int argc, char **argv)
@@ -37,6 +36,9 @@
 #ifndef PT_TEST_H
 #define PT_TEST_H
 
+#if !defined(PT_TEST_LINKED) && !defined(PATHTRACER_IMPLEMENTATION)
+#define PATHTRACER_IMPLEMENTATION /* the Makefile compiles the implementation once, for all programs */
+#endif
 #include "pathtracer.h"
 
 #include <stdarg.h>

@@ -7,7 +7,6 @@
    uniform points of the surface with cosine-weighted directions inwards; and a uniform direction with a
    uniform offset in the disk across it, as wide as a sphere around the body. */
 
-#define PATHTRACER_IMPLEMENTATION
 #include "pt_means.h"
 
 #define ROWS_PATH "tests/data/oracles_geometry.csv"

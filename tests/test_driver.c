@@ -5,7 +5,6 @@
    Run it in the project's top directory. Files are written to build/test if that is a directory, else to the
    current one, and removed. LONG=1 checks the estimated error at 64 and 256 samples too. */
 
-#define PATHTRACER_IMPLEMENTATION
 #include "pt_test.h"
 
 static pt_rgb grey(double v) { return pt_rgb_grey((pt_real)v); }

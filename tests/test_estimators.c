@@ -2,7 +2,6 @@
    variances and quantiles that are known exactly. The exact values stand in tests/data/oracles_mc.csv; at the
    end every row must have been used. */
 
-#define PATHTRACER_IMPLEMENTATION
 #include "pt_rows.h"
 
 #define ROWS_PATH "tests/data/oracles_mc.csv"

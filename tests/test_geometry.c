@@ -1,7 +1,6 @@
 /* test_geometry.c: rays meet shapes where they should, never leak, never meet the surface they start on; the
    tree finds what a linear search finds ([PT-06], [PT-07], and pt_intersect of [PT-10]). */
 
-#define PATHTRACER_IMPLEMENTATION
 #include "pt_cases.h"
 
 static const double infinity = HUGE_VAL;

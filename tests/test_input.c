@@ -14,7 +14,7 @@ static void pool_free(void *pointer, void *user);
 #define PT_REALLOC(pointer, size, user) pool_realloc(pointer, size, user)
 #define PT_FREE(pointer, user) pool_free(pointer, user)
 
-#define PATHTRACER_IMPLEMENTATION
+#define PT_STATIC /* its own memory functions need an implementation of its own */
 #include "pt_test.h"
 #include <limits.h>
 

@@ -4,7 +4,6 @@
 
    Exact values are closed forms worked out at the line. Arguments choose functions: ./test_lights spot sky. */
 
-#define PATHTRACER_IMPLEMENTATION
 #include "pt_test.h"
 
 /* ---- helpers ---------------------------------------------------------------------------------------- */

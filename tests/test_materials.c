@@ -25,7 +25,7 @@ static void limited_free(void *p)
 #define PT_MALLOC(size, user) limited_realloc(NULL, size)
 #define PT_REALLOC(pointer, size, user) limited_realloc(pointer, size)
 #define PT_FREE(pointer, user) limited_free(pointer)
-#define PATHTRACER_IMPLEMENTATION
+#define PT_STATIC /* its own memory functions need an implementation of its own */
 #include "pt_rows.h"
 
 #define ROWS_PATH "tests/data/oracles_bsdf.csv"

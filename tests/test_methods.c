@@ -5,7 +5,6 @@
    Each method is held to path tracing restricted to the paths that the method follows, and to formulas by hand.
    Expressions are held to a matcher of this file that works in another way. Arguments choose functions. */
 
-#define PATHTRACER_IMPLEMENTATION
 #include "pt_test.h"
 
 #define UNITS 128 /* independent randomisations of a Sobol estimate */

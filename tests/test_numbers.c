@@ -1,7 +1,6 @@
 /* test_numbers.c: what everything else counts on - random numbers, samplers, statistics, colour, radiometry,
    image files ([PT-00] to [PT-03], [PT-05], [PT-17]). */
 
-#define PATHTRACER_IMPLEMENTATION
 #include "pt_cases.h"
 
 /* A relative difference that is 0 for equal infinities and for 0 against 0. */

@@ -7,7 +7,6 @@
    roulette the variance of one path: where the sample variance itself has no finite variance, its value is
    shown and not judged. */
 
-#define PATHTRACER_IMPLEMENTATION
 #include "pt_means.h"
 
 #define POINTS 1024u /* in each randomisation of an estimate */

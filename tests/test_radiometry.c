@@ -10,7 +10,6 @@
      RAD-DISK-005, RAD-ESPH-005, -008 and -009, VF-PAR-003, VF-SPHCAV-004): the other estimators serve.
      VF-CUBE6 (one radiosity a face) is not in the table: path tracing converges to VF-CUBE1 instead. */
 
-#define PATHTRACER_IMPLEMENTATION
 #include "pt_means.h"
 
 #include <float.h>

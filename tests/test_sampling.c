@@ -1,7 +1,6 @@
 /* test_sampling.c: directions and points come with the density that is said, and everything that is sampled
    integrates to what is known exactly ([PT-04], [PT-08], [PT-09], the camera of [PT-10]). */
 
-#define PATHTRACER_IMPLEMENTATION
 #include "pt_cases.h"
 
 static double dbl(pt_real x) { return (double)x; }

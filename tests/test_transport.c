@@ -6,7 +6,6 @@
    more samples. Exact values are closed forms worked out at the line, or come from the files in tests/data.
    The work is about 50 CPU seconds; arguments choose functions: ./test_transport furnaces pools. */
 
-#define PATHTRACER_IMPLEMENTATION
 #include "pt_test.h"
 
 #define UNITS 128 /* independent randomisations of a Sobol estimate */
