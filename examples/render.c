@@ -44,6 +44,7 @@ typedef struct tool {
     progress_style style;
     double last_shown;     /* wall seconds at which progress was last shown                               */
     int line_length;       /* characters of the progress line that stand on the terminal                  */
+    pt_lpe lpe;             /* of --only */
 } tool;
 
 /* ---- Ctrl-C ---------------------------------------------------------------------------------------- */
@@ -71,6 +72,10 @@ static void print_help(void)
           "  --error E         stop when the estimated relative error is below E (0.05)\n"
           "  --method NAME     rendering method (path); see --list\n"
           "  --sampler NAME    sobol (default), independent, stratified (needs --spp only)\n"
+          "  --filter NAME     pixel filter: box (default), tent, gaussian\n"
+          "  --only WORDS      only light along such paths, as 'LS+DE' or 'L(S|D)*DDE': a light-path\n"
+          "                    expression over L D G S V E\n"
+          "  --branching N     directions per hit of method branching (4)\n"
           "  --seed N          other random numbers (0)\n"
           "  --max-edges N     longest path: 1 lights seen, 2 direct light, ... (no limit)\n"
           "  --roulette R      throughput (default), none, or a survival probability\n"
@@ -226,6 +231,40 @@ static int set_sampler(tool *t, const char *name, const char *value)
     return bad_value(name, value, "the name of a sampler; see --list");
 }
 
+static int set_filter(tool *t, const char *name, const char *value)
+{
+    static const char *const names[3] = {"box", "tent", "gaussian"};
+    int i;
+
+    for (i = 0; i < 3; i++)
+        if (strcmp(value, names[i]) == 0) {
+            t->desc.filter = (pt_filter)i;
+            return EXIT_OK;
+        }
+    return bad_value(name, value, "box, tent or gaussian");
+}
+
+static int set_only(tool *t, const char *name, const char *value)
+{
+    const char *why;
+
+    if (pt_lpe_compile(&t->lpe, &value, 1, &why) == PT_OK) {
+        t->desc.li.lpe = &t->lpe;
+        return EXIT_OK;
+    }
+    fprintf(stderr, "render: %s '%s': %s\n", name, value, why);
+    return EXIT_USAGE;
+}
+
+static int set_branching(tool *t, const char *name, const char *value)
+{
+    uint64_t n;
+
+    if (!parse_whole(value, 1024, &n) || n < 1) return bad_value(name, value, "in 1..1024");
+    t->desc.li.branching = (int)n;
+    return EXIT_OK;
+}
+
 static int set_seed(tool *t, const char *name, const char *value)
 {
     int ok = parse_whole(value, UINT64_MAX, &t->desc.seed);
@@ -303,7 +342,8 @@ static const struct {
     {"--method", set_method},     {"--sampler", set_sampler},     {"--seed", set_seed},
     {"--max-edges", set_max_edges}, {"--roulette", set_roulette}, {"--threads", set_threads},
     {"--exposure", set_exposure}, {"--csv", set_csv},             {"--svg", set_svg},
-    {"--progress", set_progress},
+    {"--progress", set_progress}, {"--filter", set_filter},       {"--only", set_only},
+    {"--branching", set_branching},
 };
 
 /* Takes one option: "--name value", or "--name=value" for the long ones. Moves *i to the last argument that
@@ -500,10 +540,13 @@ static int tell_written(const char *path, pt_result result)
 static int write_all(const tool *t, const pt_film *film, const pt_report *report)
 {
     const pt_report *reports[1];
+    pt_film only = PT_FILM_INIT; /* --only: the class of the expression instead of the whole */
+    pt_result result = t->desc.li.lpe ? pt_film_class(film, 0, &only) : PT_OK;
     int i, ok = 1;
 
     for (i = 0; i < t->output_count; i++)
-        ok &= tell_written(t->outputs[i], write_picture(t->outputs[i], film, t->exposure));
+        ok &= tell_written(t->outputs[i], result == PT_OK ? write_picture(t->outputs[i], t->desc.li.lpe ? &only : film, t->exposure) : result);
+    pt_film_free(&only);
     if (t->csv) ok &= tell_written(t->csv, pt_report_write_csv(report, t->csv));
     reports[0] = report;
     if (t->svg) ok &= tell_written(t->svg, pt_report_write_svg(reports, NULL, 1, t->scene_name, t->svg));
