@@ -3241,7 +3241,7 @@ PTDEF double pt_radiance_of_flux(double flux, double area)
 PTDEF pt_rgbd pt_watts_from_lumens(double lumens, pt_rgb colour)
 {
     double r = (double)colour.r, g = (double)colour.g, b = (double)colour.b, y = pt_luminance(r, g, b);
-    double k = y > 0 ? lumens / (683.002 * y) : 0;
+    double k = y > 0 ? lumens / (PT_LUMENS_PER_WATT * y) : 0;
     return pt_rgbd3(k * r, k * g, k * b);
 }
 
