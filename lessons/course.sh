@@ -389,14 +389,15 @@ numbers_of() { grep -oE '\bEX == [0-9]+' "lessons/$1.c" | awk '$3 > 0 { print $3
 
 exercises()
 {
+    mkdir -p $build/ex
     good=0
     bad=0
     for name in $(names "$@"); do
         for ex in $(numbers_of "$name"); do
-            program=$build/${name}_ex$ex
+            program=$build/ex/${name}_ex$ex
             if ! quick "$name" "-DEX=$ex" "$program" > "$program.cc" 2>&1; then verdict='does not compile'
             elif [ -s "$program.cc" ]; then verdict='compiles with warnings'
-            elif (cd $build && SHORT=1 "./${name}_ex$ex" > "${name}_ex$ex.out" 2>&1 < /dev/null); then verdict=
+            elif (cd $build/ex && SHORT=1 "./${name}_ex$ex" > "${name}_ex$ex.out" 2>&1 < /dev/null); then verdict=
             else verdict="exit status $?"; fi
             if [ -z "$verdict" ]; then
                 good=$((good + 1))
@@ -408,7 +409,7 @@ exercises()
             fi
             echo "$mark $name -DEX=$ex: $verdict"
             case $mark in FAIL*) head -n 5 "$program.cc"; grep -E '^FAIL|^exercise' "$program.out" 2> /dev/null ;; esac
-            rm -f "$program" $build/"${name}_ex$ex".p?? $build/"${name}_ex$ex".svg
+            rm -f "$program"
         done
     done
     echo "exercises: $good passed, $bad failed"
