@@ -2,19 +2,19 @@
 
    QUESTION   How does a list of shapes become a picture?
 
-   IDEA       One ray for each pixel, backwards, from the eye into the scene. It asks each shape where it is met,
-              and the nearest meeting in front of the eye decides what the pixel shows.
+   IDEA       One ray for each pixel, backwards, from the eye into the scene. It asks each shape where it is
+              met, and the nearest meeting in front of the eye decides what the pixel shows.
 
                   ray         o + t d,  d = forward + x a tan(h/2) right + y tan(h/2) up,  x, y in [-1, 1]
                   sphere      |o + t d - c|^2 = r^2,  t = -b - sqrt(b^2 - q),  b = d.(o-c),  q = |o-c|^2 - r^2
                   triangle    o + t d = v0 + u e1 + v e2  with u, v >= 0, u + v <= 1: Cramer's rule
 
-              Row 0 of a picture is its top, so y falls while the row rises. Light is computed in linear numbers; a
-              file holds sRGB codes, a curve close to a power of 1/2.2: half the light has code 188, not 128.
-              How much of the picture does a shape cover? In the plane at distance 1 a ball on the axis, at distance
-              d, is a circle of radius r / sqrt(d^2 - r^2), a triangle parallel to the picture at distance z is
-              itself divided by z, and the picture has the area 4 a tan^2(h/2). So the shares are known exactly,
-              and counting random rays must give them.
+              Row 0 of a picture is its top, so y falls while the row rises. Light is computed in linear
+              numbers; a file holds sRGB codes, a curve close to a power of 1/2.2: half the light has code
+              188, not 128. How much of the picture does a shape cover? In the plane at distance 1 a ball on
+              the axis, at distance d, is a circle of radius r / sqrt(d^2 - r^2), a triangle parallel to the
+              picture at distance z is itself divided by z, and the picture has the area 4 a tan^2(h/2). So
+              the shares are known exactly, and counting random rays must give them.
 
    BUILD      cc -O2 -I.. 01_first_image.c -o 01_first_image -lm -pthread
    RUN        ./01_first_image [samples] [output]
@@ -30,9 +30,9 @@
    HEADER     [PT-01] pt_srgb_byte, [PT-06] pt_intersect_sphere, pt_intersect_triangle, [PT-10] pt_camera_ray,
               [PT-17] pt_write_ppm_bytes, pt_write_png_bytes
 
-   SOURCES    Moeller, Trumbore: Fast, Minimum Storage Ray/Triangle Intersection, 1997; [Hai19] and [Woo13]: what the
-              header does, because b^2 - q loses its digits for small balls far away and because two triangles that
-              share an edge must leave no gap; IEC 61966-2-1 (sRGB)
+   SOURCES    Moeller, Trumbore: Fast, Minimum Storage Ray/Triangle Intersection, 1997; [Hai19] and [Woo13]:
+              what the header does, because b^2 - q loses its digits for small balls far away and because two
+              triangles that share an edge must leave no gap; IEC 61966-2-1 (sRGB)
 
    Before: nothing. Next: lesson 02, local lighting. */
 
@@ -127,9 +127,16 @@ static int nearest(const pt_ray *ray, int mine, double *t)
 {
     double ball, flat, b[2];
     int found = 0;
-    if (mine ? my_ball(ray, &ball) : pt_intersect_sphere(ray, pt_v3(0, 0, 0), 1, &ball)) { found = 1; *t = ball; }
-    if ((mine ? my_triangle(ray, &flat) : pt_intersect_triangle(ray, corner[0], corner[1], corner[2], &flat, b)) &&
-        (!found || flat < *t)) { found = 2; *t = flat; }
+    if (mine ? my_ball(ray, &ball) : pt_intersect_sphere(ray, pt_v3(0, 0, 0), 1, &ball)) {
+        found = 1;
+        *t = ball;
+    }
+    if ((mine ? my_triangle(ray, &flat)
+              : pt_intersect_triangle(ray, corner[0], corner[1], corner[2], &flat, b)) &&
+        (!found || flat < *t)) {
+        found = 2;
+        *t = flat;
+    }
     return found;
 }
 
@@ -143,13 +150,15 @@ static void table(int shape, const char *name, int mine, double most, double exa
     for (n = floor(most / 256); n <= most; n *= 16) {
         while (s.n < n) {
             double x = pt_pcg32_double(&random), y = pt_pcg32_double(&random);
-            pt_ray ray = mine ? my_camera_ray(x, y)
-                              : pt_camera_ray(&camera, (pt_real)WIDTH / HEIGHT, (pt_real)x, (pt_real)y, pt_v2(0, 0));
+            pt_ray ray =
+                mine ? my_camera_ray(x, y)
+                     : pt_camera_ray(&camera, (pt_real)WIDTH / HEIGHT, (pt_real)x, (pt_real)y, pt_v2(0, 0));
             pt_stats_add(&s, nearest(&ray, mine, &t) == shape);
         }
         row(name, &s, exact, pt_cpu_seconds() - seconds);
     }
-    check(fabs(s.mean - exact) <= 5 * pt_stats_standard_error(&s), "within 5 standard errors of the exact share");
+    check(fabs(s.mean - exact) <= 5 * pt_stats_standard_error(&s),
+          "within 5 standard errors of the exact share");
 }
 
 /* One ray through the middle of each pixel. The colour shows the normal: (n + 1) / 2. */
@@ -166,7 +175,8 @@ static void picture(unsigned char *rgb)
         c[0] = 0.5 + 0.5 * (double)n.x;
         c[1] = 0.5 + 0.5 * (double)n.y;
         c[2] = 0.5 + 0.5 * (double)n.z;
-        for (k = 0; k < 3; k++) rgb[3 * i + k] = my_srgb_byte(shape ? c[k] : 0.05 + 0.15 * i / (WIDTH * HEIGHT));
+        for (k = 0; k < 3; k++)
+            rgb[3 * i + k] = my_srgb_byte(shape ? c[k] : 0.05 + 0.15 * i / (WIDTH * HEIGHT));
     }
 }
 
@@ -188,7 +198,8 @@ int main(int argc, char **argv)
     table(2, "pt triangle", 0, most, flat);
     printf("What to see: 16 times the rays, 16 times the seconds, a quarter of the error.\n");
 
-    check(nearest(&ray, 1, &t) == 1 && fabs(t - 4) < 1e-5, "the middle ray meets the ball first at distance 4");
+    check(nearest(&ray, 1, &t) == 1 && fabs(t - 4) < 1e-5,
+          "the middle ray meets the ball first at distance 4");
     for (code = 0; code < 256; code++) equal += my_srgb_byte(code / 255.0) == pt_srgb_byte(code / 255.0);
     check(equal == 256, "my sRGB codes are the header's");
     check(my_srgb_byte(0.5) == 188, "half the light has code 188");
@@ -200,16 +211,17 @@ int main(int argc, char **argv)
     check(pt_write_png_bytes(path, rgb, WIDTH, HEIGHT) == PT_OK, "and by the header as PNG");
 
     printf("lesson 01: %d passed, %d failed\n", passed, failed);
-    if (MISTAKE) printf("exercise %d is a mistake: %s\n", EX, failed ? "the checks noticed it" : "NOBODY NOTICED");
+    if (MISTAKE)
+        printf("exercise %d is a mistake: %s\n", EX, failed ? "the checks noticed it" : "NOBODY NOTICED");
     return MISTAKE ? failed == 0 : failed != 0;
 }
 
 /* EXERCISES
    (1) Predict: the field of view grows from 40 to 60 degrees (-DEX=1). By which factor do both shares fall?
        Answer: (tan 20 / tan 30)^2 = 0.3974, so the ball covers 0.07363. All checks still pass.
-   (2) Break: take the root where the ray leaves the ball (-DEX=2). Which check fails, and why do the shares not
-       change? Answer: "at distance 4" (it is 6 now); a line that leaves the ball has entered it. Then write linear
-       light to the file (-DEX=3): both checks of sRGB fail, and the picture is too dark.
-   (3) Extend: put a second ball of radius 1/2 at (0, 0, 2), in front of the first, and count the rays that meet
-       the first ball first. Answer: (pi / 24 - pi (1/4) / (9 - 1/4)) / 0.70652 = 0.05823; neither the ball nor the
-       camera moved: a share of what is seen is no property of the shape alone. */
+   (2) Break: take the root where the ray leaves the ball (-DEX=2). Which check fails, and why do the shares
+       not change? Answer: "at distance 4" (it is 6 now); a line that leaves the ball has entered it. Then
+       write linear light to the file (-DEX=3): both checks of sRGB fail, and the picture is too dark.
+   (3) Extend: put a second ball of radius 1/2 at (0, 0, 2), in front of the first, and count the rays that
+       meet the first ball first. Answer: (pi / 24 - pi (1/4) / (9 - 1/4)) / 0.70652 = 0.05823; neither the
+       ball nor the camera moved: a share of what is seen is no property of the shape alone. */

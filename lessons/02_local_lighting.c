@@ -6,19 +6,19 @@
 
                   L = La + Ld + Ls = ka Ia + kd (I/r^2) max(0, n.l) + ks (I/r^2) max(0, n.h)^p
 
-              n is the normal, l points to the lamp at distance r, v to the eye, and h = (l + v) / |l + v| lies half
-              way between (Blinn 1977; Phong 1975 had max(0, m.v)^p with the mirror image m of l). The middle term is
-              physics: a lamp of intensity I gives the irradiance E = I n.l / r^2. A grey surface then has the
-              radiance f E with f = albedo / pi, so kd is albedo / pi and never above 1/pi; with kd = albedo, as it
-              is often used, L is pi times too bright. The last term is a guess that looks good, the first a
-              confession: the light that comes from everywhere else is not known.
+              n is the normal, l points to the lamp at distance r, v to the eye, and h = (l + v) / |l + v|
+              lies half way between (Blinn 1977; Phong 1975 had max(0, m.v)^p with the mirror image m of l).
+              The middle term is physics: a lamp of intensity I gives the irradiance E = I n.l / r^2. A grey
+              surface then has the radiance f E with f = albedo / pi, so kd is albedo / pi and never above
+              1/pi; with kd = albedo, as it is often used, L is pi times too bright. The last term is a guess
+              that looks good, the first a confession: the light that comes from everywhere else is not known.
               With the eye at the lamp, h = l, and the mean over a disk of radius R right below the lamp, at
               distance H, is known: dA n.l / r^2 is the solid angle dw, so with cos a = H / sqrt(R^2 + H^2)
 
                   mean Ld = 2 kd I (1 - cos a) / R^2,   mean Ls = 2 ks I (1 - cos^p a) / (p R^2)
 
-              No ray is traced to the lamp: nothing can be in between. Nothing is mirrored, and no light comes from
-              the neighbours.
+              No ray is traced to the lamp: nothing can be in between. Nothing is mirrored, and no light comes
+              from the neighbours.
 
    BUILD      cc -O2 -I.. 02_local_lighting.c -o 02_local_lighting -lm -pthread
    RUN        ./02_local_lighting [samples] [output]
@@ -33,8 +33,8 @@
 
    HEADER     [PT-11] pt_li_local, pt_li_path, [PT-08] pt_material_blinn, [PT-10] pt_add_point_light
 
-   SOURCES    Phong: Illumination for Computer Generated Pictures, 1975; Blinn: Models of Light Reflection for Computer
-              Synthesized Pictures, 1977; the first slide of the lecture on path tracing
+   SOURCES    Phong: Illumination for Computer Generated Pictures, 1975; Blinn: Models of Light Reflection for
+              Computer Synthesized Pictures, 1977; the first slide of the lecture on path tracing
 
    Before: lesson 01. Next: lesson 03, Whitted's ray tracing. */
 
@@ -114,7 +114,7 @@ static double header_local(pt_vec3 from, pt_vec3 to, pt_li_fn li, int max_edges)
     return li(&scene, &ray, &sampler, &options, &info).g;
 }
 
-/* The mean over the disk: random points, the eye at the lamp. which: 0 all three, 1 Ld, 2 Ls, 3 the header's. */
+/* The mean over the disk: random points, the eye at the lamp. which: 0 all, 1 Ld, 2 Ls, 3 the header's. */
 static void table(const char *name, int which, double most, double exact)
 {
     const pt_vec3 lamp = {0, (pt_real)height, 0}, up = {0, 1, 0};
@@ -131,7 +131,8 @@ static void table(const char *name, int which, double most, double exact)
         }
         row(name, &s, exact, pt_cpu_seconds() - seconds);
     }
-    check(fabs(s.mean - exact) <= 5 * pt_stats_standard_error(&s), "within 5 standard errors of the exact mean");
+    check(fabs(s.mean - exact) <= 5 * pt_stats_standard_error(&s),
+          "within 5 standard errors of the exact mean");
 }
 
 /* A floor and a lamp; with_balls adds what local lighting cannot do justice to. */
@@ -158,7 +159,8 @@ static void picture(const char *output)
     pt_render_desc desc = pt_render_defaults();
     char path[1024];
     int k, x, y;
-    desc.camera = pt_camera_look_at(pt_v3(0, 3, 7), pt_v3((pt_real)0.25, (pt_real)0.625, 0), pt_v3(0, 1, 0), 36);
+    desc.camera =
+        pt_camera_look_at(pt_v3(0, 3, 7), pt_v3((pt_real)0.25, (pt_real)0.625, 0), pt_v3(0, 1, 0), 36);
     desc.width = WIDTH / 2;
     desc.height = HEIGHT;
     desc.spp = 32;
@@ -167,13 +169,15 @@ static void picture(const char *output)
     for (k = 0; k < 2; k++) {
         pt_film film = PT_FILM_INIT;
         desc.method = k ? "path" : "local";
-        check(pt_render(&scene, &desc, &film, NULL) == PT_OK, k ? "right: path tracing" : "left: local lighting");
+        check(pt_render(&scene, &desc, &film, NULL) == PT_OK,
+              k ? "right: path tracing" : "left: local lighting");
         for (y = 0; y < HEIGHT; y++)
             for (x = 0; x < WIDTH / 2; x++) {
                 pt_rgbd v = pt_film_pixel(&film, x, y);
                 unsigned char *to = rgb + 3 * (y * WIDTH + x + k * WIDTH / 2);
                 double scale = k ? 2 : 2 / PT_PI;
-                to[0] = pt_srgb_byte(scale * v.r), to[1] = pt_srgb_byte(scale * v.g), to[2] = pt_srgb_byte(scale * v.b);
+                to[0] = pt_srgb_byte(scale * v.r), to[1] = pt_srgb_byte(scale * v.g),
+                to[2] = pt_srgb_byte(scale * v.b);
             }
         pt_film_free(&film);
     }
@@ -187,7 +191,8 @@ int main(int argc, char **argv)
 {
     double most = (argc > 1 ? fmax(atof(argv[1]), 4096) : 262144) / (getenv("SHORT") ? 16 : 1), term[3];
     double cosa = height / sqrt(disk * disk + height * height), d2 = disk * disk, local, path;
-    double ld = 2 * kd * intensity * (1 - cosa) / d2, ls = 2 * ks * intensity * (1 - pow(cosa, power)) / (power * d2);
+    double ld = 2 * kd * intensity * (1 - cosa) / d2,
+           ls = 2 * ks * intensity * (1 - pow(cosa, power)) / (power * d2);
     const pt_vec3 up = {0, 1, 0}, foot = {0, 0, 0}, eye = {3, 1, 0}, lamp = {0, (pt_real)height, 0};
     pt_vec3 l = pt_v3_normalize(pt_v3(-3, 4, 0)), v = pt_v3_normalize(pt_v3((pt_real)3.25, 4, 0));
 
@@ -201,7 +206,8 @@ int main(int argc, char **argv)
 
     my_local(foot, up, eye, pt_v3(0, -1, 0), term);
     check(term[1] == 0, "a lamp below the floor gives no diffuse light");
-    check(fabs(my_phong(up, l, v, 20) / my_blinn(up, l, v, 80) - 1) < 0.01, "Phong with p is Blinn with 4 p, nearly");
+    check(fabs(my_phong(up, l, v, 20) / my_blinn(up, l, v, 80) - 1) < 0.01,
+          "Phong with p is Blinn with 4 p, nearly");
     pt_scene_free(&scene);
 
     make_scene(1);
@@ -209,7 +215,8 @@ int main(int argc, char **argv)
     local = header_local(eye, foot, pt_li_local, 0);
     path = header_local(eye, foot, pt_li_path, 2);
     printf("below the red ball: local lighting %.4g, light that arrives %.4g\n", local, path);
-    check(fabs(term[0] + term[1] - local) < 1e-5 && path == 0, "local lighting does not see that the ball is in the way");
+    check(fabs(term[0] + term[1] - local) < 1e-5 && path == 0,
+          "local lighting does not see that the ball is in the way");
     local = header_local(pt_v3(3, 1, 3), pt_v3(2, 0, 2), pt_li_local, 0) - kaIa;
     path = header_local(pt_v3(3, 1, 3), pt_v3(2, 0, 2), pt_li_path, 2);
     check(fabs(local / path - PT_PI) < 1e-4, "with kd = albedo it is pi times too bright");
@@ -217,15 +224,18 @@ int main(int argc, char **argv)
     pt_scene_free(&scene);
 
     printf("lesson 02: %d passed, %d failed\n", passed, failed);
-    if (MISTAKE) printf("exercise %d is a mistake: %s\n", EX, failed ? "the checks noticed it" : "NOBODY NOTICED");
+    if (MISTAKE)
+        printf("exercise %d is a mistake: %s\n", EX, failed ? "the checks noticed it" : "NOBODY NOTICED");
     return MISTAKE ? failed == 0 : failed != 0;
 }
 
 /* EXERCISES
-   (1) Predict: the lamp hangs twice as high, at 4 instead of 2 (-DEX=1). Is the mean of Ld over the disk a quarter?
-       Answer: no, 0.2639 instead of 0.7322: a lamp nearby does not light all of the disk from distance H.
-   (2) Break: leave out max(0, n.l) (-DEX=2): negative light from a lamp below the floor; one check fails, and no
-       table notices, since there the lamp is always above. Leave out 1/r^2 (-DEX=3): the tables of my terms fail.
+   (1) Predict: the lamp hangs twice as high, at 4 instead of 2 (-DEX=1). Is the mean of Ld over the disk a
+       quarter? Answer: no, 0.2639 instead of 0.7322: a lamp nearby does not light all of the disk from
+       distance H.
+   (2) Break: leave out max(0, n.l) (-DEX=2): negative light from a lamp below the floor; one check fails, and
+       no table notices, since there the lamp is always above. Leave out 1/r^2 (-DEX=3): the tables of my
+       terms fail.
    (3) Extend: move the eye to infinity above the floor, v = (0, 1, 0), and find the mean of Ls with p = 2 by
-       integration over the disk. Answer: n.h = cos(t/2) for the angle t at the lamp, its square is (1 + cos t) / 2,
-       and the mean is (ks I / R^2) (-ln(cos a) + 1 - cos a) = 0.3997. */
+       integration over the disk. Answer: n.h = cos(t/2) for the angle t at the lamp, its square is (1 + cos
+       t) / 2, and the mean is (ks I / R^2) (-ln(cos a) + 1 - cos a) = 0.3997. */

@@ -8,24 +8,26 @@
                   mirror     one ray:                      L = albedo L(reflected)
                   glass      two rays:                     L = R L(reflected) + (1 - R) L(refracted)
 
-              with R from Fresnel's formulas (lesson 20): a tree. A plate of glass, seen straight on, has
-              R = ((n-1)/(n+1))^2 = 0.04 on each side; with what goes to and fro within, the share (1-R)/(1+R) = 0.923
-              passes: a geometric series, which the tree sums. A lamp that is a point throws sharp shadows: that of a
-              ball of radius r at distance d below it, on a floor at distance H below it, is a circle of area
-              pi H^2 r^2 / (d^2 - r^2).
-              The next ray starts where this one ended, at a rounded point a little inside or outside the surface. From
-              inside it meets its own surface at once: acne. The usual cure, a small fixed step away, is too small in
-              a large scene and too large in a small one; the header moves the start by a bound of that point's own
-              rounding error. What the tree never finds: light that comes through glass to the floor (its shadow is
-              black, without a caustic), soft shadows, light between diffuse surfaces.
+              with R from Fresnel's formulas (lesson 20): a tree. A plate of glass, seen straight on, has R =
+              ((n-1)/(n+1))^2 = 0.04 on each side; with what goes to and fro within, the share (1-R)/(1+R) =
+              0.923 passes: a geometric series, which the tree sums. A lamp that is a point throws sharp
+              shadows: that of a ball of radius r at distance d below it, on a floor at distance H below it,
+              is a circle of area pi H^2 r^2 / (d^2 - r^2). The next ray starts where this one ended, at a
+              rounded point a little inside or outside the surface. From inside it meets its own surface at
+              once: acne. The usual cure, a small fixed step away, is too small in a large scene and too large
+              in a small one; the header moves the start by a bound of that point's own rounding error. What
+              the tree never finds: light that comes through glass to the floor (its shadow is black, without
+              a caustic), soft shadows, light between diffuse surfaces.
 
    BUILD      cc -O2 -I.. 03_whitted.c -o 03_whitted -lm -pthread
    RUN        ./03_whitted [samples] [output]
 
    PRINTS     case             samples     estimate        exact  std.error  seconds
-              no offset, 1       16384        0.227            0     0.0033    0.005
+              my shadow         262144     0.471661     0.471239    0.00097    0.110
+              ...
+              no offset, 1       16384     0.390991            0     0.0038    0.006
 
-   WORDS      Whitted ray tracing Whitted 式光线追踪; shadow ray 阴影光线; reflection 反射; refraction 折射;
+   WORDS      ray tracing 光线追踪; shadow ray 阴影光线; reflection 反射; refraction 折射;
               Fresnel term 菲涅耳项; hard shadow 硬阴影; multiple recursion 多重递归; rounding error 舍入误差
 
    HEADER     [PT-06] pt_spawn_ray, pt_spawn_ray_to, [PT-10] pt_intersect, pt_occluded, [PT-11] pt_li_whitted,
@@ -160,11 +162,14 @@ static double wrong_share(const char *name, double scale, double step, double mo
     pt_pcg32 random = pt_pcg32_make(3, 0);
     pt_stats s = PT_STATS_INIT;
     double seconds = pt_cpu_seconds();
-    pt_vec3 lamp = pt_v3_scale(pt_v3(2, 3, 3), (pt_real)scale), eye = pt_v3_scale(pt_v3(0, 0, 4), (pt_real)scale);
-    pt_add_sphere(&scene, pt_v3(0, 0, 0), (pt_real)scale, pt_add_material(&scene, pt_material_diffuse(pt_rgb_grey(0))));
+    pt_vec3 lamp = pt_v3_scale(pt_v3(2, 3, 3), (pt_real)scale),
+            eye = pt_v3_scale(pt_v3(0, 0, 4), (pt_real)scale);
+    pt_add_sphere(&scene, pt_v3(0, 0, 0), (pt_real)scale,
+                  pt_add_material(&scene, pt_material_diffuse(pt_rgb_grey(0))));
     if (pt_commit(&scene) != PT_OK) return -1;
     while (s.n < most) {
-        pt_vec3 q = pt_warp_sphere(pt_v2((pt_real)pt_pcg32_double(&random), (pt_real)pt_pcg32_double(&random)));
+        pt_vec3 q =
+            pt_warp_sphere(pt_v2((pt_real)pt_pcg32_double(&random), (pt_real)pt_pcg32_double(&random)));
         pt_ray ray = ray_to(eye, pt_v3_scale(q, (pt_real)(0.9 * scale)));
         pt_hit hit;
         double nl;
@@ -196,7 +201,8 @@ static void table(const char *name, int mine, double most, double exact)
         }
         row(name, &s, exact, pt_cpu_seconds() - seconds);
     }
-    check(fabs(s.mean - exact) <= 5 * pt_stats_standard_error(&s), "within 5 standard errors of the exact share");
+    check(fabs(s.mean - exact) <= 5 * pt_stats_standard_error(&s),
+          "within 5 standard errors of the exact share");
 }
 
 /* Floor, a glass ball below the lamp, a mirror; a ceiling above the lamp, which must not throw a shadow. */
@@ -208,7 +214,8 @@ static void make_scene(void)
     int white = pt_add_material(&scene, tiles), glass = pt_add_material(&scene, pt_material_dielectric(ior));
     int mirror = pt_add_material(&scene, pt_material_mirror(pt_rgb_grey((pt_real)0.9)));
     tiles.texture = &checker;
-    pt_add_parallelogram(&scene, pt_v3(-6, 0, -6), pt_v3(0, 0, 12), pt_v3(12, 0, 0), pt_add_material(&scene, tiles));
+    pt_add_parallelogram(&scene, pt_v3(-6, 0, -6), pt_v3(0, 0, 12), pt_v3(12, 0, 0),
+                         pt_add_material(&scene, tiles));
     pt_add_parallelogram(&scene, pt_v3(-6, 4, -6), pt_v3(12, 0, 0), pt_v3(0, 0, 12), white);
     pt_add_sphere(&scene, pt_v3(0, 1, 0), (pt_real)0.5, glass);
     pt_add_sphere(&scene, pt_v3(-2, 1, -2), 1, mirror);
@@ -228,7 +235,8 @@ static void plate(double exact)
                          pt_add_material(&scene, pt_material_emitter(pt_rgb_grey(1))));
     check(pt_commit(&scene) == PT_OK, "the plate is ready");
     mine = my_whitted(&ray, 1);
-    printf("through a plate of glass: mine %.5f, header %.5f, exact %.5f\n", mine, header_whitted(&ray), exact);
+    printf("through a plate of glass: mine %.5f, header %.5f, exact %.5f\n", mine, header_whitted(&ray),
+           exact);
     check(fabs(mine - exact) < 1e-5 && fabs(header_whitted(&ray) - exact) < 1e-5, "the tree sums the series");
     pt_scene_free(&scene);
 }
@@ -237,7 +245,8 @@ static void plate(double exact)
 static int picture(const char *output)
 {
     static unsigned char rgb[WIDTH * HEIGHT * 3];
-    pt_camera camera = pt_camera_look_at(pt_v3(0, 3, 6), pt_v3((pt_real)-0.5, (pt_real)0.75, 0), pt_v3(0, 1, 0), 40);
+    pt_camera camera =
+        pt_camera_look_at(pt_v3(0, 3, 6), pt_v3((pt_real)-0.5, (pt_real)0.75, 0), pt_v3(0, 1, 0), 40);
     char path[1024];
     int i, different = 0;
     for (i = 0; i < WIDTH * HEIGHT; i++) {
@@ -267,7 +276,8 @@ int main(int argc, char **argv)
     pt_scene_free(&scene);
     plate((1 - reflectance) / (1 + reflectance));
 
-    printf("points of a ball that think wrongly of the lamp, for balls of radius 1, a million, a millionth:\n");
+    printf(
+        "points of a ball that think wrongly of the lamp, for balls of radius 1, a million, a millionth:\n");
     wrong = wrong_share("no offset, 1", 1, 0, most / 16);
     usual = wrong_share("1e-4, 1", 1, EX == 2 ? 0 : 1e-4, most / 16);
     check(wrong > 0.05 && usual == 0, "without an offset many are wrong, with 1e-4 none");
@@ -280,15 +290,16 @@ int main(int argc, char **argv)
     check(wrong == 0, "the header's bound holds at all scales");
 
     printf("lesson 03: %d passed, %d failed\n", passed, failed);
-    if (MISTAKE) printf("exercise %d is a mistake: %s\n", EX, failed ? "the checks noticed it" : "NOBODY NOTICED");
+    if (MISTAKE)
+        printf("exercise %d is a mistake: %s\n", EX, failed ? "the checks noticed it" : "NOBODY NOTICED");
     return MISTAKE ? failed == 0 : failed != 0;
 }
 
 /* EXERCISES
    (1) Predict: glass of index 2 (-DEX=1). What comes through the plate?
        Answer: R = 1/9 on each side, (1 - R) / (1 + R) = 0.8.
-   (2) Break: start rays where they ended (-DEX=2) and look at the picture. Then let the shadow ray go on beyond the
-       lamp (-DEX=3). Which checks fail? Answer: (2) my picture, full of dots, and the one about offsets; (3) my
-       picture and my shadow: the ceiling darkens all of the floor, and the share is 1.
+   (2) Break: start rays where they ended (-DEX=2) and look at the picture. Then let the shadow ray go on
+       beyond the lamp (-DEX=3). Which checks fail? Answer: (2) my picture, full of dots, and the one about
+       offsets; (3) my picture and my shadow: the ceiling darkens all of the floor, and the share is 1.
    (3) Extend: a second lamp like the first, at (1, 3, 0). Which share of the square is still quite dark?
        Answer: 0.274, where the two shadows overlap. */

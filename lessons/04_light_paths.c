@@ -2,9 +2,10 @@
 
    QUESTION   Which light does a method find, and which light can it never find?
 
-   IDEA       Write down what happened to the light on its way: L lamp, D diffuse reflection, S mirror or glass,
-              V volume, E eye. A kind of light is then a set of words, and a regular expression names it: (S|D)* is any
-              number of surfaces, S+ one or more, D? one or none. The slides' rows, with what they leave out:
+   IDEA       Write down what happened to the light on its way: L lamp, D diffuse reflection, S mirror or
+              glass, V volume, E eye. A kind of light is then a set of words, and a regular expression names
+              it: (S|D)* is any number of surfaces, S+ one or more, D? one or none. The slides' rows, with
+              what they leave out:
 
                   LE               the lamp itself                 (not on the slides)
                   L(D|S)E          direct light                    local lighting, lesson 02: its D
@@ -14,13 +15,14 @@
                   L(S|D)+DS+E      caustics and bleeding in mirrors
                   L(S|D)+D(S|D)*E  "others"
 
-              The last row of the slides overlaps with three rows above it: of the 2^k words with k surfaces it has all
-              that have a D after the first letter, 2^k - 2, but only 2^(k-2) - 1 of them are in no row above. Read as
-              "the first row that matches" the rows are a partition: each word is in exactly one, and so the light of
-              all rows adds up to the whole. Whitted's tree finds LD?S*E: 2 words of 2^k.
-              In a white sphere of radius 1, albedo rho, around a lamp of flux Phi that is a point, every wall point
-              has the same light from k diffuse reflections, wherever the lamp is: LDDE is rho^2 Phi / (4 pi^2), each
-              D more multiplies it by rho, so LDD+E = L(S|D)*DDE has rho^2 Phi / (4 pi^2 (1 - rho)).
+              The last row of the slides overlaps with three rows above it: of the 2^k words with k surfaces
+              it has all that have a D after the first letter, 2^k - 2, but only 2^(k-2) - 1 of them are in no
+              row above. Read as "the first row that matches" the rows are a partition: each word is in
+              exactly one, and so the light of all rows adds up to the whole. Whitted's tree finds LD?S*E: 2
+              words of 2^k. In a white sphere of radius 1, albedo rho, around a lamp of flux Phi that is a
+              point, every wall point has the same light from k diffuse reflections, wherever the lamp is:
+              LDDE is rho^2 Phi / (4 pi^2), each D more multiplies it by rho, so LDD+E = L(S|D)*DDE has rho^2
+              Phi / (4 pi^2 (1 - rho)).
 
    BUILD      cc -O2 -I.. 04_light_paths.c -o 04_light_paths -lm -pthread
    RUN        ./04_light_paths [samples] [output]
@@ -31,11 +33,11 @@
    WORDS      light path notation 光路传输记法; caustics 焦散; color bleeding 颜色扩散; indirect lighting 间接光照;
               direct lighting 直接光照; volumetric scattering 体积散射; light transport 光传输
 
-   HEADER     [PT-11] pt_lpe_compile, pt_lpe_class, pt_lpe_slides, pt_observer, [PT-19] pt_scene_diffuse_sphere,
-              pt_scene_cornell_spheres, [PT-10] pt_film_class
+   HEADER     [PT-11] pt_lpe_compile, pt_lpe_class, pt_lpe_slides, pt_observer, [PT-19]
+              pt_scene_diffuse_sphere, pt_scene_cornell_spheres, [PT-10] pt_film_class
 
-   SOURCES    Heckbert: Adaptive Radiosity Textures for Bidirectional Ray Tracing, 1990; the lecture's slide on the
-              notation of light paths; [Vea97] 8.3
+   SOURCES    Heckbert: Adaptive Radiosity Textures for Bidirectional Ray Tracing, 1990; the lecture's slide
+              on the notation of light paths; [Vea97] 8.3
 
    Before: lesson 03. Next: lesson 05, distribution ray tracing. */
 
@@ -129,7 +131,8 @@ static void count_words(const pt_lpe *slides, const pt_lpe *whitted)
         if (EX == 2) count[OTHERS] = literal; /* the slides' rows as they stand */
         printf(" %4d\n", literal);
         for (which = 0, j = 0; which < ROWS; which++) j += count[which];
-        right &= j == n && finds == 2 && literal == (k > 1 ? n - 2 : 0) && (k < 2 || count[OTHERS] == n / 4 - 1);
+        right &=
+            j == n && finds == 2 && literal == (k > 1 ? n - 2 : 0) && (k < 2 || count[OTHERS] == n / 4 - 1);
     }
     check(right, "the rows add up to 2^k words, others have 2^(k-2) - 1, Whitted 2, as computed");
     check(same, "each word is in the row that the header puts it in");
@@ -178,7 +181,8 @@ static void table(const pt_lpe *slides, double most)
         row("my bleeding", &mine, exact, pt_cpu_seconds() - seconds);
         row("pt bleeding", &header, exact, pt_cpu_seconds() - seconds);
     }
-    check(fabs(mine.mean - exact) <= 5 * pt_stats_standard_error(&mine), "within 5 standard errors of the exact radiance");
+    check(fabs(mine.mean - exact) <= 5 * pt_stats_standard_error(&mine),
+          "within 5 standard errors of the exact radiance");
     check(most_off < 1e-6, "path by path, my rows get the light that the header's get");
     pt_scene_free(&scene);
 }
@@ -187,7 +191,8 @@ static void table(const pt_lpe *slides, double most)
 static void picture(const pt_lpe *slides, double spp, const char *output)
 {
     static unsigned char rgb[4 * SIZE * SIZE * 3];
-    static const char *const name[] = {"", "direct", "mirrors", "caustic", "bleeding", "in mirrors", "others"};
+    static const char *const name[] = {"",         "direct",     "mirrors", "caustic",
+                                       "bleeding", "in mirrors", "others"};
     pt_render_desc desc = pt_render_defaults();
     pt_scene scene = PT_SCENE_INIT;
     pt_film film = PT_FILM_INIT;
@@ -198,7 +203,8 @@ static void picture(const pt_lpe *slides, double spp, const char *output)
     desc.spp = (uint32_t)spp;
     desc.threads = 1;
     desc.li.lpe = slides;
-    check(pt_scene_cornell_spheres(&scene, &desc.camera) == PT_OK && pt_render(&scene, &desc, &film, NULL) == PT_OK,
+    check(pt_scene_cornell_spheres(&scene, &desc.camera) == PT_OK &&
+              pt_render(&scene, &desc, &film, NULL) == PT_OK,
           "the box is rendered, one picture for each row");
     for (i = 0; i < SIZE * SIZE; i++) whole += pt_film_pixel(&film, i % SIZE, i / SIZE).g;
     for (which = EMISSION; which < ROWS; which++) {
@@ -207,9 +213,11 @@ static void picture(const pt_lpe *slides, double spp, const char *output)
         if (pt_film_class(&film, which, &part) != PT_OK) break;
         for (i = 0; i < SIZE * SIZE; i++) {
             pt_rgbd v = pt_film_pixel(&part, i % SIZE, i / SIZE);
-            unsigned char *to = rgb + 3 * ((i / SIZE + panel / 2 * SIZE) * 2 * SIZE + i % SIZE + panel % 2 * SIZE);
+            unsigned char *to =
+                rgb + 3 * ((i / SIZE + panel / 2 * SIZE) * 2 * SIZE + i % SIZE + panel % 2 * SIZE);
             share[which] += v.g / whole;
-            if (panel < 4) to[0] = pt_srgb_byte(3 * v.r), to[1] = pt_srgb_byte(3 * v.g), to[2] = pt_srgb_byte(3 * v.b);
+            if (panel < 4)
+                to[0] = pt_srgb_byte(3 * v.r), to[1] = pt_srgb_byte(3 * v.g), to[2] = pt_srgb_byte(3 * v.b);
         }
         sum += share[which];
         pt_film_free(&part);
@@ -217,7 +225,9 @@ static void picture(const pt_lpe *slides, double spp, const char *output)
     printf("light in the picture of the box, the lamp itself left out:\n");
     for (which = DIRECT; which < ROWS; which++)
         printf("%-12s %5.1f %%  %s\n", name[which], 100 * share[which] / (1 - share[EMISSION]),
-               which == DIRECT ? "found by local lighting" : which == MIRRORS ? "found by Whitted" : "found by neither");
+               which == DIRECT    ? "found by local lighting"
+               : which == MIRRORS ? "found by Whitted"
+                                  : "found by neither");
     check(fabs(sum - 1) < 1e-9, "the rows add up to the whole picture");
     snprintf(path, sizeof path, "%s.ppm", output);
     check(pt_write_ppm_bytes(path, rgb, 2 * SIZE, 2 * SIZE) == PT_OK, "written as PPM");
@@ -237,16 +247,18 @@ int main(int argc, char **argv)
     count_words(&slides, &whitted);
     table(&slides, most);
     picture(&slides, getenv("SHORT") ? 4 : 32, argc > 2 ? argv[2] : "04_light_paths");
-    printf("What to see: two fifths of the light were found by nobody. \"Others\" are few, but not nothing.\n");
+    printf(
+        "What to see: two fifths of the light were found by nobody. \"Others\" are few, but not nothing.\n");
     printf("lesson 04: %d passed, %d failed\n", passed, failed);
-    if (MISTAKE) printf("exercise %d is a mistake: %s\n", EX, failed ? "the checks noticed it" : "NOBODY NOTICED");
+    if (MISTAKE)
+        printf("exercise %d is a mistake: %s\n", EX, failed ? "the checks noticed it" : "NOBODY NOTICED");
     return MISTAKE ? failed == 0 : failed != 0;
 }
 
 /* EXERCISES
    (1) Predict: paths of at most three edges (-DEX=1). What is left of colour bleeding in the white sphere?
        Answer: LDDE alone, half of it: 0.006333 instead of 0.01267, for rho = 1/2.
-   (2) Break: take the slides' last row as it stands (-DEX=2): the rows have more words than there are. Or read the
-       words from the eye (-DEX=3): a caustic LSDE becomes a diffuse thing seen in a mirror, LDSE.
+   (2) Break: take the slides' last row as it stands (-DEX=2): the rows have more words than there are. Or
+       read the words from the eye (-DEX=3): a caustic LSDE becomes a diffuse thing seen in a mirror, LDSE.
    (3) Extend: class LSDDSE, and find a method of this course's first five lessons that draws it.
        Answer: in mirrors, L(S|D)+DS+E; none does. */

@@ -1,36 +1,41 @@
 /* Lesson 05: distribution ray tracing
 
-   QUESTION   What makes edges smooth, shadows soft, backgrounds blurred and metal rough, and how many rays is that?
+   QUESTION   What makes edges smooth, shadows soft, backgrounds blurred and metal rough, and how many rays is
+              that?
 
-   IDEA       Each of these is a mean: over the area of a pixel, of a lamp, of a lens, over the lobe of directions that
-              a rough surface reflects. A mean is estimated by asking at random places (Cook, Porter, Carpenter 1984):
+   IDEA       Each of these is a mean: over the area of a pixel, of a lamp, of a lens, over the lobe of
+              directions that a rough surface reflects. A mean is estimated by asking at random places (Cook,
+              Porter, Carpenter 1984):
 
                   pixel   a point of the square              share of x + 2 y < 1:    1/4
                   lens    a point of the disk of radius R    share that sees x > s at depth z, focus at f:
-                                                             (acos c - c sqrt(1 - c^2)) / pi,  c = s / (R |1 - z/f|)
-                  light   a point of the lamp                E = A mean of (V cos cos' / r^2): Lambert's formula for
-                                                             the part of the lamp that is visible
+                                     (acos c - c sqrt(1 - c^2)) / pi,  c = s / (R |1 - z/f|)
+                  light   a point of the lamp                E = A mean of (V cos cos' / r^2):
+                                     Lambert's formula for the part of the lamp that is visible
                   gloss   a direction, density (m+1)/(2 pi) cos^m, around the mirrored one:
                                                              a round lamp of half angle a: 1 - cos^(m+1) a
 
-              The point of it: the means are not nested. One ray takes one random number for each of its decisions,
-              all at once. Four means with 4 rays each, one inside the other, are 256 rays whose pixel was asked at 4
-              places only; 256 rays that decide all at once ask the pixel at 256 places, and the lens, and the lamp.
-              All decisions of one ray need numbers of their own: a ray that uses one number twice sees only
-              combinations that belong together by chance.
-              Light that goes from one diffuse surface to the next is still missing: words L(D|G|S)?(G|S)*E.
+              The point of it: the means are not nested. One ray takes one random number for each of its
+              decisions, all at once. Four means with 4 rays each, one inside the other, are 256 rays whose
+              pixel was asked at 4 places only; 256 rays that decide all at once ask the pixel at 256 places,
+              and the lens, and the lamp. All decisions of one ray need numbers of their own: a ray that uses
+              one number twice sees only combinations that belong together by chance. Light that goes from one
+              diffuse surface to the next is still missing: words L(D|G|S)?(G|S)*E.
 
    BUILD      cc -O2 -I.. 05_distribution.c -o 05_distribution -lm -pthread
    RUN        ./05_distribution [samples] [output]
 
    PRINTS     mean over        samples     estimate        exact  std.error  seconds
-              my pixel            1024     0.249023         0.25      0.014    0.000
+              my pixel            1024     0.251953         0.25      0.014    0.000
+              ...
+              rays              262144   0.00681939   0.00683974    7.6e-05    0.027
+              trees of 256        1024   0.00700545   0.00683974    0.00027    0.012
 
    WORDS      distribution ray tracing 分布式光线追踪; anti-aliasing 抗锯齿; area light 面光源; soft shadow 软阴影;
               depth of field 景深; glossy 光泽; samples per pixel 每像素采样数; penumbra 半影
 
-   HEADER     [PT-11] pt_li_distribution, [PT-10] pt_camera_ray, pt_filter_sample, [PT-05] pt_irradiance_polygon,
-              [PT-08] pt_material_phong
+   HEADER     [PT-11] pt_li_distribution, [PT-10] pt_camera_ray, pt_filter_sample, [PT-05]
+              pt_irradiance_polygon, [PT-08] pt_material_phong
 
    SOURCES    [Coo84]; Cook: Stochastic Sampling in Computer Graphics, 1986; [Lam60]
 
@@ -63,7 +68,7 @@ static void row(const char *name, const pt_stats *s, double exact, double second
 
 /* ---- mine ---- */
 
-static const double lens_radius = EX == 1 ? 0.25 : 0.5, focus = 4, depth = 2, edge = 0.0625; /* depth: z, edge: s */
+static const double lens_radius = EX == 1 ? 0.25 : 0.5, focus = 4, depth = 2, edge = 0.0625; /* z, s */
 static const double exponent = 19; /* m of the density; Phong's f cos has its exponent + 1 */
 
 /* Does this point of the pixel see the shape x + 2 y < 1? */
@@ -72,7 +77,8 @@ static double my_pixel(pt_vec2 u) { return (double)u.x + 2 * (double)u.y < 1; }
 /* Does the ray from this point of the lens, through the point in focus on the axis, pass x > s at depth z? */
 static double my_lens(pt_vec2 u)
 {
-    double r = lens_radius * (EX == 3 ? (double)u.x : sqrt((double)u.x)), x = r * cos(2 * PT_PI * (double)u.y);
+    double r = lens_radius * (EX == 3 ? (double)u.x : sqrt((double)u.x)),
+           x = r * cos(2 * PT_PI * (double)u.y);
     return x * (1 - depth / focus) > edge;
 }
 
@@ -83,7 +89,7 @@ static double my_light(pt_vec2 u)
     return x > 0 ? 4 / (r2 * r2) : 0; /* cos = cos' = 2 / r */
 }
 
-/* Does the direction with this density around the vertical hit the ball of radius 1 at height 3? sin a = 1/3. */
+/* Does the direction with this density around the vertical hit the ball at height 3? Its sin a = 1/3. */
 static double my_gloss(pt_vec2 u)
 {
     double cosine = pow(1 - (double)u.x, 1 / (exponent + 1)); /* the cumulative probability, inverted */
@@ -92,7 +98,10 @@ static double my_gloss(pt_vec2 u)
 
 static double my_decision(int which, pt_vec2 u)
 {
-    return which == PIXEL ? my_pixel(u) : which == LENS ? my_lens(u) : which == LIGHT ? my_light(u) : my_gloss(u);
+    return which == PIXEL   ? my_pixel(u)
+           : which == LENS  ? my_lens(u)
+           : which == LIGHT ? my_light(u)
+                            : my_gloss(u);
 }
 
 static pt_vec2 pair(pt_pcg32 *random)
@@ -134,7 +143,8 @@ static void make_scene(pt_scene *scene, int which)
     pt_add_parallelogram(scene, pt_v3(-9, 0, -9), pt_v3(0, 0, 18), pt_v3(18, 0, 0), base);
     if (which == LIGHT) {
         pt_add_parallelogram(scene, pt_v3(-9, 1, -9), pt_v3(0, 0, 18), pt_v3(9, 0, 0), base);
-        pt_add_parallelogram(scene, pt_v3((pt_real)-0.5, 2, (pt_real)-0.5), pt_v3(1, 0, 0), pt_v3(0, 0, 1), lamp);
+        pt_add_parallelogram(scene, pt_v3((pt_real)-0.5, 2, (pt_real)-0.5), pt_v3(1, 0, 0), pt_v3(0, 0, 1),
+                             lamp);
     } else pt_add_sphere(scene, pt_v3(0, 3, 0), 1, lamp);
     check(pt_commit(scene) == PT_OK, which == LIGHT ? "a scene for the light" : "a scene for the gloss");
 }
@@ -176,7 +186,8 @@ static void table(const char *name, int which, int mine, double most, double exa
                                   : header_decision(&scene, which, &sampler, (uint32_t)s.n));
         row(name, &s, exact, pt_cpu_seconds() - seconds);
     }
-    check(fabs(s.mean - exact) <= 5 * pt_stats_standard_error(&s), "within 5 standard errors of the exact mean");
+    check(fabs(s.mean - exact) <= 5 * pt_stats_standard_error(&s),
+          "within 5 standard errors of the exact mean");
     pt_scene_free(&scene);
 }
 
@@ -191,9 +202,12 @@ static void all_at_once(double most, double exact)
     seconds = pt_cpu_seconds();
     while (256 * nested.n < most) pt_stats_add(&nested, my_tree(&random, 0));
     row("trees of 256", &nested, exact, pt_cpu_seconds() - seconds);
-    check(fabs(at_once.mean - exact) <= 5 * pt_stats_standard_error(&at_once), "rays: within 5 standard errors");
-    check(fabs(nested.mean - exact) <= 5 * pt_stats_standard_error(&nested), "trees: within 5 standard errors");
-    check(pt_stats_standard_error(&at_once) < pt_stats_standard_error(&nested) / 2, "rays have half the error, or less");
+    check(fabs(at_once.mean - exact) <= 5 * pt_stats_standard_error(&at_once),
+          "rays: within 5 standard errors");
+    check(fabs(nested.mean - exact) <= 5 * pt_stats_standard_error(&nested),
+          "trees: within 5 standard errors");
+    check(pt_stats_standard_error(&at_once) < pt_stats_standard_error(&nested) / 2,
+          "rays have half the error, or less");
 }
 
 static void picture(const char *output)
@@ -202,10 +216,13 @@ static void picture(const char *output)
     pt_scene scene = PT_SCENE_INIT;
     pt_film film = PT_FILM_INIT;
     int k, white = pt_add_material(&scene, pt_material_diffuse(pt_rgb_grey(0.75)));
-    int metal = pt_add_material(&scene, pt_material_conductor(pt_rgb3((pt_real)0.14, (pt_real)0.37, (pt_real)1.44),
-                                                              pt_rgb3((pt_real)3.98, (pt_real)2.38, (pt_real)1.6), 0.5));
+    int metal = pt_add_material(
+        &scene, pt_material_conductor(pt_rgb3((pt_real)0.14, (pt_real)0.37, (pt_real)1.44),
+                                      pt_rgb3((pt_real)3.98, (pt_real)2.38, (pt_real)1.6), 0.5));
     pt_add_parallelogram(&scene, pt_v3(-9, 0, -20), pt_v3(0, 0, 29), pt_v3(18, 0, 0), white);
-    for (k = 0; k < 4; k++) pt_add_sphere(&scene, pt_v3((pt_real)(1.5 * k - 2), 1, (pt_real)(3 - 3 * k)), 1, k % 2 ? white : metal);
+    for (k = 0; k < 4; k++)
+        pt_add_sphere(&scene, pt_v3((pt_real)(1.5 * k - 2), 1, (pt_real)(3 - 3 * k)), 1,
+                      k % 2 ? white : metal);
     pt_add_parallelogram(&scene, pt_v3(-3, 6, 0), pt_v3(3, 0, 0), pt_v3(0, 0, 3),
                          pt_add_material(&scene, pt_material_emitter(pt_rgb_grey(12))));
     desc.camera = pt_camera_look_at(pt_v3(-6, 3, 8), pt_v3(0, 1, -1), pt_v3(0, 1, 0), 35);
@@ -216,11 +233,13 @@ static void picture(const char *output)
     desc.spp = getenv("SHORT") ? 2 : 24;
     desc.threads = 1;
     desc.method = "distribution";
-    check(pt_commit(&scene) == PT_OK && pt_render(&scene, &desc, &film, NULL) == PT_OK, "the picture is rendered");
+    check(pt_commit(&scene) == PT_OK && pt_render(&scene, &desc, &film, NULL) == PT_OK,
+          "the picture is rendered");
     for (k = 0; k < 2; k++) {
         char path[1024];
         snprintf(path, sizeof path, "%s.%s", output, k ? "png" : "ppm");
-        check((k ? pt_write_png(path, &film, 1) : pt_write_ppm(path, &film, 1)) == PT_OK, k ? "and as PNG" : "written as PPM");
+        check((k ? pt_write_png(path, &film, 1) : pt_write_ppm(path, &film, 1)) == PT_OK,
+              k ? "and as PNG" : "written as PPM");
     }
     pt_film_free(&film);
     pt_scene_free(&scene);
@@ -238,7 +257,8 @@ int main(int argc, char **argv)
     exact[LENS] = (acos(c) - c * sqrt(1 - c * c)) / PT_PI;
     exact[LIGHT] = pt_irradiance_polygon(1, pt_v3(0, 0, 0), pt_v3(0, 1, 0), visible, 4);
     exact[GLOSS] = 1 - pow(8 / 9.0, (exponent + 1) / 2);
-    printf("%-14s %9s %12s %12s %10s %8s\n", "mean over", "samples", "estimate", "exact", "std.error", "seconds");
+    printf("%-14s %9s %12s %12s %10s %8s\n",
+           "mean over", "samples", "estimate", "exact", "std.error", "seconds");
     for (k = 0; k < DECISIONS; k++) {
         table(mine[k], k, 1, most, exact[k]);
         table(header[k], k, 0, most, exact[k]);
@@ -248,14 +268,15 @@ int main(int argc, char **argv)
     printf("What to see: trees of rays are cheaper by the ray, and still lose.\n");
     picture(argc > 2 ? argv[2] : "05_distribution");
     printf("lesson 05: %d passed, %d failed\n", passed, failed);
-    if (MISTAKE) printf("exercise %d is a mistake: %s\n", EX, failed ? "the checks noticed it" : "NOBODY NOTICED");
+    if (MISTAKE)
+        printf("exercise %d is a mistake: %s\n", EX, failed ? "the checks noticed it" : "NOBODY NOTICED");
     return MISTAKE ? failed == 0 : failed != 0;
 }
 
 /* EXERCISES
    (1) Predict: half the lens radius (-DEX=1). Which share of the lens sees x > s?
        Answer: c = 1/2 instead of 1/4, and so 0.1955 instead of 0.3425.
-   (2) Break: let pixel and lens use the same numbers (-DEX=2). All eight tables are right, and the product is wrong.
-       Then choose lens points by r = R u (-DEX=3): they crowd in the middle, and "my lens" fails.
+   (2) Break: let pixel and lens use the same numbers (-DEX=2). All eight tables are right, and the product is
+       wrong. Then choose lens points by r = R u (-DEX=3): they crowd in the middle, and "my lens" fails.
    (3) Extend: hide the lamp up to x = 1/4 instead of 0. Which irradiance is left?
        Answer: Lambert's formula for [1/4, 1/2] x [-1/2, 1/2] gives 0.05599. */
