@@ -167,12 +167,14 @@ static void table(const pt_lpe *slides, double most)
         for (; mine.n < n; i++) {
             pt_rgbd classes[16] = {{0, 0, 0}};
             pt_li_info info = {0};
+            pt_vec2 at;
             pt_ray ray;
             int which;
             info.classes = classes;
             for (which = 0; which < ROWS; which++) sum[which] = 0;
             pt_sampler_start(&sampler, 0, i);
-            ray = pt_camera_ray(&camera, 1, pt_sampler_1d(&sampler), pt_sampler_1d(&sampler), pt_v2(0, 0));
+            at = pt_sampler_2d(&sampler); /* two calls as arguments of one: who knows which comes first? */
+            ray = pt_camera_ray(&camera, 1, at.x, at.y, pt_v2(0, 0));
             pt_li_path(&scene, &ray, &sampler, &options, &info);
             pt_stats_add(&mine, sum[BLEEDING]);
             pt_stats_add(&header, classes[BLEEDING].g);
