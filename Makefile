@@ -32,9 +32,10 @@ SHARES = $(shell k=1; while [ $$k -le $(JOBS) ]; do echo $$k; k=$$((k + 1)); don
 TESTS = $(patsubst tests/%.c,%,$(wildcard tests/test_*.c))
 # Those that take longest begin first, so that none is left alone at the end; scripts look at no numbers.
 LONGEST = $(filter test_transport test_driver test_radiometry test_oracles,$(TESTS))
-SCRIPTS = $(if $(SEED),,switches docs sections)
+SCRIPTS = $(if $(SEED),,switches docs sections lessons)
 STARTED = $(LONGEST:%=build/test/%.log) $(SCRIPTS:%=build/test/check_%.log) $(TESTS:%=build/test/%.log)
 TEST_LOGS = $(SCRIPTS:%=build/test/check_%.log) $(TESTS:%=build/test/%.log)
+LESSONS = $(patsubst lessons/%.c,%,$(sort $(wildcard lessons/[0-9][0-9]_*.c)))
 EXAMPLES = minimal render scenes own_threads two_files cpp_user
 # Samples per pixel of the contact sheet.
 SHEET_SPP = 128
@@ -44,7 +45,7 @@ FROM = 1
 SEEDS = 100
 TO = $(shell echo $$(($(FROM) + $(SEEDS) - 1)))
 
-.PHONY: all scenes test test-long test-seeds test-table test-logs examples bench mutants clean help FORCE
+.PHONY: all scenes lessons lesson-programs course exercises test test-long test-seeds test-table test-logs examples bench mutants clean help FORCE
 # A program that was built only half is no program.
 .DELETE_ON_ERROR:
 
@@ -59,11 +60,14 @@ help:
 	@echo 'make test-long  the same with the checks that need more samples'
 	@echo 'make test-seeds the statistical checks with other random numbers: SEEDS=100 of them, from FROM=1 on'
 	@echo 'make test-table writes tests/README.md: each quantity, its exact value, and what was measured'
+	@echo 'make lessons    build and run all lessons; each must pass and print what lessons/README.md shows; N=07 runs one'
+	@echo 'make course     the same, and lessons/README.md and lessons/img/ made anew from them'
+	@echo 'make exercises  build each lesson with each of its exercises, -DEX=1 and on, and run it; N=07 tries one'
 	@echo 'make examples   build and run the programs of examples/'
 	@echo 'make bench      rays per second, compile time, what leaving out saves; CSV on stdout'
 	@echo 'make mutants    break the header, one change at a time; every broken copy must fail a check; GENERATED=n ALL=1'
 	@echo 'make clean      remove build/'
-	@echo 'variables       CC CFLAGS LDFLAGS EXTRA JOBS; SHORT=1 SEED=n for the tests; SCENE SIZE SPP for plain make'
+	@echo 'variables       CC CFLAGS LDFLAGS EXTRA JOBS; SHORT=1 SEED=n for the tests; SCENE SIZE SPP for plain make; N for lessons'
 
 clean:
 	rm -rf build
@@ -121,6 +125,29 @@ build/examples/cpp_user: examples/cpp_user.cpp pathtracer.h build/flags
 	    echo '$(BUILD_CXX) examples/cpp_user.cpp -o $@ $(LDLIBS)'; \
 	    $(BUILD_CXX) examples/cpp_user.cpp -o $@ $(LDLIBS); \
 	else : > $@; fi
+
+# ---- lessons -------------------------------------------------------------------------------------
+
+# N=07, or N='07 08', takes some of them.
+COURSE = CC='$(CC)' CFLAGS='$(CFLAGS)' EXTRA='$(EXTRA)' WARN='$(WARN_C)' sh lessons/course.sh
+CHOSEN = $(if $(N),$(foreach n,$(N),$(filter $(n)_%,$(LESSONS))),$(LESSONS))
+
+# Two are built at a time, then they run one after the other, so that seconds are their own.
+lessons: lesson-programs
+	@$(COURSE) run $(N)
+
+course: lesson-programs
+	@$(COURSE) write $(N)
+
+exercises:
+	@$(COURSE) exercises $(N)
+
+lesson-programs:
+	@$(MAKE) --no-print-directory $(if $(findstring jobserver,$(MAKEFLAGS)),,-j$(JOBS)) $(CHOSEN:%=build/lessons/%)
+
+build/lessons/%: lessons/%.c pathtracer.h build/flags
+	@mkdir -p build/lessons
+	$(BUILD_C) $< -o $@ $(LDLIBS)
 
 # ---- tests ---------------------------------------------------------------------------------------
 
