@@ -12,9 +12,8 @@
 
                   f_r(omega_i -> omega_r) = dL_r(omega_r) / dE(omega_i) = dL_r / (L_i cos(theta_i) d omega_i)
                   ideal diffuse:   f = rho / pi                        the same for all pairs of directions
-                  glossy (Phong):  f = k_s (n+2)/(2 pi) cos^n(alpha)   alpha: from omega_r to the mirror
-                  direction ideal specular:  a delta function: 0 for every direction that can be written down
-                  beforehand
+                  glossy (Phong):  f = k_s (n+2)/(2 pi) cos^n(alpha)   alpha: omega_r to the mirror direction
+                  ideal specular:  f = a delta function                0 for every direction chosen beforehand
 
               Reciprocity: f is the same with its two directions exchanged. Energy: the albedo, the integral
               of f cos(theta_r) d omega_r, is at most 1. f itself may be above 1: it is a density, not a
