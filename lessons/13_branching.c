@@ -248,7 +248,7 @@ int main(int argc, char **argv)
 
 /* EXERCISES
    (1) Predict: trees of 3 edges instead of 5 (-DEX=1). By how much is the error of N = 8 larger than that of
-       N = 1, for the same number of rays? Answer: sqrt(73 V_3(8) / (3 V_3(1))) = 1.64; for 5 edges it is 8.6.
+       N = 1, for the same number of rays? Answer: sqrt(73 V_3(8) / (3 V_3(1))) = 1.64; for 5 edges it is 9.4.
    (2) Break: forget the 1/N (-DEX=2): the sum grows as N^d. Compare with 1 / (1 - rho), as if nothing were
        cut off (-DEX=3): both tables fail, the light of more than 5 edges, rho^5 / (1 - rho) = 0.0625, is
        missing.
