@@ -239,10 +239,12 @@ int main(int argc, char **argv)
 }
 
 /* EXERCISES (cc -DEX=1 ... compiles the first one, and so on)
-   1. Predict and run, -DEX=1: the balance heuristic. Where one technique is nearly perfect it trusts the other too
-      much: std error .00066, not .00038, for the shiny plate; 1.2e-4, not 4.4e-6, for the small lamp.
+   1. Predict and run, -DEX=1: the balance heuristic. Where one technique is nearly perfect it trusts the
+      other too much: std error .00066, not .00038, for the shiny plate; 1.2e-4, not 4.4e-6, for the small
+      lamp.
    2. Break it, and watch which check fails. -DEX=2: no weights (the means double). -DEX=3: both weights 1/2
-      (only the check of the variance sees it: the means are right). -DEX=4: in the weight, the lamp's density
-      is per area instead of per solid angle: weights no longer sum to 1 (.3223 instead of .3727).
+      (only the check of the variance sees it: the means are right). -DEX=4: in the weight, the lamp's
+      density is per area instead of per solid angle: weights no longer sum to 1 (.3223 instead of .3727).
    3. Extend it: draw one technique with probability 1/2 instead of both, and divide by 1/2
-      (pt_estimate_mis_one). Balance is the best weight there ([Vea97] theorem 9.4); one ray instead of two. */
+      (pt_estimate_mis_one). Balance is the best weight there ([Vea97] theorem 9.4); one ray instead of two.
+   */
