@@ -301,10 +301,11 @@ words()
     echo
 }
 
-# README.md with its generated parts made anew, to standard output; $1: what the lessons printed is taken from
-# "build" or from "readme".
-assemble()
+# README.md with its generated parts made anew, to standard output. What the lessons named have printed is taken from
+# build/lessons/, that of the others from README.md.
+assemble() # NAME...
 {
+    fresh=" $* "
     parts=$build/parts
     rm -rf $parts
     mkdir -p $parts
@@ -312,8 +313,10 @@ assemble()
     for name in $(names); do
         number=${name%%_*}
         list="$list $number"
-        if [ "$1" = build ] && [ -f $build/"$name".out ]; then cp $build/"$name".out $parts/out
-        else shown "$number" > $parts/out; fi
+        case $fresh in
+        *" $name "*) cp $build/"$name".out $parts/out ;;
+        *) shown "$number" > $parts/out ;;
+        esac
         section "$name" $parts/out | cat -s > $parts/"$number"
     done
     contents > $parts/contents
@@ -358,7 +361,8 @@ write()
             [ ! -f $build/"$name".$kind ] || cp $build/"$name".$kind lessons/img/
         done
     done
-    assemble build > $build/README.md && mv $build/README.md $readme && echo "wrote $readme"
+    # shellcheck disable=SC2046
+    assemble $(names "$@") > $build/README.md && mv $build/README.md $readme && echo "wrote $readme"
 }
 
 # ---- exercises -----------------------------------------------------------------------------------
@@ -418,7 +422,7 @@ exercises()
 
 case ${1-} in
 run | write | exercises) "$@" ;;
-text) assemble readme > "$2" ;;
+text) assemble > "$2" ;;
 quick) shift; quick "$@" ;;
 title | numbers_of | extract) "$@" ;;
 names) shift; names "$@" ;;
