@@ -231,7 +231,7 @@ int main(int argc, char **argv)
           "cutting loses rho^4 / (1 - rho), however many samples are taken");
     table("my", my_shade, &s, samples);
     table("its", its_shade, &s, samples);
-    printf("What to see: every q is right; mine is fastest at q = 0.75, where variance * edges is least.\n");
+    printf("What to see: every q is right; mine is fastest near q = 0.75, where variance * edges is least.\n");
     picture(argc > 2 ? argv[2] : "14_roulette");
     pt_scene_free(&s.scene);
     printf("lesson 14: %d passed, %d failed\n", passed, failed);
@@ -244,8 +244,8 @@ int main(int argc, char **argv)
    (1) Predict: rho = 0.8 (-DEX=1). For which q is the variance of mine infinite, and does the table show it?
        Answer: for q <= 4/3 * 0.64 = 0.853; any single run shows a finite number, small and wrong: values that
        are rare and huge are missing. This is why survival must follow the throughput.
-   (2) Break: do not divide by q (-DEX=2); take shade() of the slides as it stands (-DEX=3), mean 0.5 instead of 2;
-       cut at 4 edges besides (-DEX=4), 1.875. All are dark; only the exact value tells.
+   (2) Break: do not divide by q (-DEX=2); take shade() of the slides as it stands (-DEX=3), mean 0.5 instead
+       of 2; cut at 4 edges besides (-DEX=4), 1.875. All are dark; only the exact value tells.
    (3) Extend: which q is best for c = 4/3 and rho = 1/2? Answer: the least of (3 / (1 - 1/(3q)) - 4) / (1 -
-       q) is 5.60, at q = 0.750. For c = 1 it falls to 4/3 as q goes to 1: with f cos / p constant, only
+       q) is 5.60, at q = 0.756. For c = 1 it falls to 4/3 as q goes to 1: with f cos / p constant, only
        roulette has variance. */
