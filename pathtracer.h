@@ -1504,7 +1504,8 @@ PTDEF pt_rgbd pt_li_path_light(const pt_scene *scene, const pt_ray *ray, pt_samp
    edges for "whitted" and "distribution", 4 for "branching"; "whitted" and "branching" follow at most 64. Both "local"
    and "whitted" leave out light from the environment, which has no middle, but show it as background.
    local: the slides' L = ka Ia + sum of (I/r^2) (kd max(0, n.l) + ks max(0, n.h)^p), no shadows, no reflections; kd,
-   ks, p are albedo, specular, exponent; every light as if all of it came from its middle. */
+   ks, p are albedo, specular, exponent (a mirror, which has no kd of its own, shows its albedo: white); every light as
+   if all of it came from its middle. */
 PTDEF pt_rgbd pt_li_local(const pt_scene *scene, const pt_ray *ray, pt_sampler *sampler, const pt_li_options *options,
                           pt_li_info *info);
 /* Whitted's tree [Whi80]: shadow rays to the middle of every light, mirror and refracted rays followed both; paths
@@ -8999,7 +9000,7 @@ typedef struct pti_axes {
 
 #define PTI_SVG_W 640.0
 #define PTI_SVG_H 440.0
-#define PTI_SVG_LEFT 70.0
+#define PTI_SVG_LEFT 84.0
 #define PTI_SVG_RIGHT 150.0
 #define PTI_SVG_TOP 40.0
 #define PTI_SVG_BOTTOM 55.0
@@ -9102,7 +9103,7 @@ static void pti_svg_grid(pti_writer *w, const pti_axes *a)
         pti_svg_text(w, left - 8, pti_svg_y(a, v) + 4, "end", "", text);
     }
     pti_svg_text(w, (left + right) / 2, PTI_SVG_H - 14, "middle", "", "CPU seconds");
-    pti_svg_text(w, 18, (top + bottom) / 2, "middle", "transform=\"rotate(-90 18 192)\"", "square root of relMSE");
+    pti_svg_text(w, 16, (top + bottom) / 2, "middle", "transform=\"rotate(-90 16 192)\"", "square root of relMSE");
 }
 
 /* A dashed line of slope -1/2 through (x, y), cut to the axes. */
