@@ -4602,7 +4602,9 @@ static pt_vec2 pti_hit_uv(const pt_hit *hit)
 #if PTI_HAS_MEASURED
 /* --- measured tables [Mat03], half vector and difference angles [Rus98] --- */
 
-enum { PTI_MERL_H = 90, PTI_MERL_D = 90, PTI_MERL_PHI = 180 };
+#define PTI_MERL_H 90
+#define PTI_MERL_D 90
+#define PTI_MERL_PHI 180
 
 /* f = raw * scale. */
 static const double pti_merl_scale[3] = {1.0 / 1500, 1.15 / 1500, 1.66 / 1500};
@@ -9438,7 +9440,7 @@ PTDEF pt_result pt_scene_caustic_ring(pt_scene *scene, pt_camera *camera)
     int mirror = pt_add_material(scene, pt_material_mirror(pt_rgb_grey(PTI_R(0.95))));
     int floor_material = pt_add_material(scene, pt_material_diffuse(pt_rgb_grey(PTI_R(0.7))));
     for (i = 0; i < SEGMENTS; i++) {
-        double phi = 2 * PT_PI * i / SEGMENTS;
+        double phi = 2 * PT_PI * i / (double)SEGMENTS;
         uint32_t a = 2 * i, b = 2 * ((i + 1) % SEGMENTS), *t = index + 6 * i;
         position[a] = pt_v3((pt_real)cos(phi), 0, (pt_real)sin(phi));
         position[a + 1] = pt_v3(position[a].x, PTI_R(0.4), position[a].z);
