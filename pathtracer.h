@@ -9497,7 +9497,7 @@ PTDEF pt_result pt_scene_materials(pt_scene *scene, pt_camera *camera)
     int x, y, i;
     for (y = 0; y < HEIGHT; y++)
         for (x = 0; x < WIDTH; x++) {
-            float *c = sky + 3 * (y * WIDTH + x), up = (float)(HEIGHT - 2 * y) / HEIGHT;
+            float *c = sky + 3 * (y * WIDTH + x), up = 1 - 2 * (float)y / (float)HEIGHT;
             c[0] = up > 0 ? 0.5f + 0.1f * (1 - up) : 0.15f;
             c[1] = up > 0 ? 0.65f + 0.1f * (1 - up) : 0.14f;
             c[2] = up > 0 ? 0.95f : 0.12f;
