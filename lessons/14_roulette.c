@@ -231,7 +231,7 @@ int main(int argc, char **argv)
           "cutting loses rho^4 / (1 - rho), however many samples are taken");
     table("my", my_shade, &s, samples);
     table("its", its_shade, &s, samples);
-    printf("What to see: every q is right; mine is fastest near q = 0.75, where variance * edges is least.\n");
+    printf("What to see: every q is right; mine is fastest near q = 0.75: least variance * edges.\n");
     picture(argc > 2 ? argv[2] : "14_roulette");
     pt_scene_free(&s.scene);
     printf("lesson 14: %d passed, %d failed\n", passed, failed);
