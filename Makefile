@@ -45,7 +45,7 @@ FROM = 1
 SEEDS = 100
 TO = $(shell echo $$(($(FROM) + $(SEEDS) - 1)))
 
-.PHONY: all scenes lessons lesson-programs course exercises test test-long test-seeds test-table test-logs examples bench mutants clean help FORCE
+.PHONY: all scenes lessons lesson-programs course exercises test test-long test-seeds test-table test-logs examples bench mutants stress fuzz clean help FORCE
 # A program that was built only half is no program.
 .DELETE_ON_ERROR:
 
@@ -66,6 +66,8 @@ help:
 	@echo 'make examples   build and run the programs of examples/'
 	@echo 'make bench      rays per second, compile time, what leaving out saves; CSV on stdout'
 	@echo 'make mutants    break the header, one change at a time; every broken copy must fail a check; GENERATED=n ALL=1'
+	@echo 'make stress     numbers at their ends, float and double side by side: table, build/stress.csv and .html (< 20 min)'
+	@echo 'make fuzz       hostile calls of every public function under sanitizers: SECONDS=10 of them'
 	@echo 'make clean      remove build/'
 	@echo 'variables       CC CFLAGS LDFLAGS EXTRA JOBS; SHORT=1 SEED=n for the tests; SCENE SIZE SPP for plain make; N for lessons'
 
@@ -183,6 +185,8 @@ build/test/test_%: tests/test_%.c $(wildcard tests/*.h) pathtracer.h build/test/
 	@mkdir -p build/test
 	$(BUILD_C) -Itests -DPT_TEST_LINKED $< build/test/implementation.o -o $@ $(LDLIBS)
 
+build/test/test_stress: tests/stress.c
+
 build/test/test_%.log: build/test/test_% FORCE
 	@sh tests/run.sh one $@ ./$<
 
@@ -215,3 +219,31 @@ mutants: build/mutants/run
 	        $(if $(ONLY),--only $(ONLY),--share $$k/$$(($(JOBS) * $(SLICES)))) --generate $(GENERATED) $(if $(ALL),--all) $(TESTS) & \
 	done; wait
 	@sh tests/run.sh sum build/mutants/share*.log
+
+# At most 4 GiB and 20 minutes on two cores; the report fails if a row does, or if one of the two did not end.
+STRESSES = build/stress/float build/stress/double build/stress/report
+stress: $(STRESSES)
+	@ulimit -v 4194304; ulimit -t 1200; for p in float double; do \
+	    echo "stress: $$p"; build/stress/$$p > build/stress/$$p.txt || true; done
+	@build/stress/report build/stress/float.txt build/stress/double.txt build/stress.csv build/stress.html
+
+build/stress/float: tests/stress.c $(wildcard tests/*.h) pathtracer.h build/flags
+	@mkdir -p build/stress
+	$(BUILD_C) -UPT_DOUBLE -Itests tests/stress.c -o $@ $(LDLIBS)
+
+build/stress/double: tests/stress.c $(wildcard tests/*.h) pathtracer.h build/flags
+	@mkdir -p build/stress
+	$(BUILD_C) -DPT_DOUBLE -Itests tests/stress.c -o $@ $(LDLIBS)
+
+build/stress/report: tests/stress_report.c pathtracer.h build/flags
+	@mkdir -p build/stress
+	$(BUILD_C) tests/stress_report.c -o $@ $(LDLIBS)
+
+# SEED=n for other calls.
+SECONDS = 10
+fuzz: build/fuzz
+	build/fuzz $(SECONDS) $(SEED)
+
+build/fuzz: tests/fuzz.c pathtracer.h build/flags
+	$(BUILD_C) -O1 -g -fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer \
+	    tests/fuzz.c -o $@ $(LDLIBS)
