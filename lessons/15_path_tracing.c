@@ -6,8 +6,7 @@
    IDEA       The tree of lesson 13 with N = 1 is a path, and the roulette of lesson 14 ends it. The noise of
               one path is large; the mean of many through a pixel, each through its own point, has
 
-                  error = sigma / sqrt(n):        four times the samples, four times the seconds, half the
-                  error
+                  error = sigma / sqrt(n):      four times the samples and the seconds, half the error
 
               It converges to the solution of the rendering equation, not to something that looks like it. The
               walls and the lamp of the Cornell box were measured for such comparisons; "exact" is here the

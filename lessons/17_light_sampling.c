@@ -47,7 +47,7 @@
 #ifndef EX
 #define EX 0 /* an exercise, see the end */
 #endif
-enum { MISTAKE = EX >= 2 && EX <= 5 };
+enum { MISTAKE = EX == 2 || EX == 3 || EX == 4 || EX == 5 };
 static const double P_RR = EX == 1 ? 0.5 : 0.8;
 
 static int passed, failed;
@@ -242,9 +242,10 @@ int main(int argc, char **argv)
        by as much (floor: from 0.00045 to 0.00068). Direct light at the first surface is found before the
        roulette and has little noise; what noise is left is that of indirect light, and that went through the
        roulette.
-   (2) Break: add emission at every hit (-DEX=2); leave out the shadow ray (-DEX=3), light goes through the
-       blocks and all is too bright; let it run into the lamp itself (-DEX=4), black; forget that the lamp is
-       two lights of which one is asked (-DEX=5), half the light.
+   (2) Break: add emission at every hit (-DEX=2): twice the light;
+       leave out the shadow ray (-DEX=3): light goes through the blocks, and all is too bright;
+       let it run into the lamp itself (-DEX=4): black;
+       forget that the lamp is two lights of which one is asked (-DEX=5): half the light.
    (3) Extend: choose lamps by pt_light_choose and points by pt_light_sample (by solid angle), and measure the
        error again. Answer: it hardly changes; the lamp is small and far away, so its points are nearly alike
        (lesson 11). */
