@@ -13,7 +13,7 @@
 
    Arguments choose groups, by the names of the functions. */
 
-#ifndef PT_TEST_LINKED
+#ifndef PT_STATIC
 #define PATHTRACER_IMPLEMENTATION
 #endif
 #include "stress_cases.h"
