@@ -1371,7 +1371,7 @@ PTDEF pt_result pt_film_make_classes(pt_film *film, int class_count);
 /* The picture of one class as a film of its own, for the writers: `out` is made anew; its halves are not told
    apart, so it has no error estimate. */
 PTDEF pt_result pt_film_class(const pt_film *film, int index, pt_film *out);
-/* The value of a pixel: the mean over all samples, splats included. */
+/* The value of a pixel: the mean over all samples, splats included; black outside and in an empty film. */
 PTDEF pt_rgbd pt_film_pixel(const pt_film *film, int x, int y);
 /* All samples per pixel. */
 PTDEF uint32_t pt_film_spp(const pt_film *film);
@@ -6717,6 +6717,7 @@ static double pti_film_value(const pt_film *film, int h, size_t k)
 PTDEF pt_rgbd pt_film_pixel(const pt_film *film, int x, int y)
 {
     size_t k = 3 * ((size_t)y * (size_t)film->width + (size_t)x);
+    if (!film->half[0] || x < 0 || y < 0 || x >= film->width || y >= film->height) return pt_rgbd3(0, 0, 0);
     return pt_rgbd3(pti_film_value(film, 2, k), pti_film_value(film, 2, k + 1), pti_film_value(film, 2, k + 2));
 }
 
