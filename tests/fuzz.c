@@ -17,8 +17,8 @@
 enum { MOST_STRATA = 0, MOST_COUNT = 2147483647 };
 #define LARGE_IMAGE "65536 65536"
 #else
-enum { MOST_STRATA = 2 };       /* more than 2^30 strata: a permutation shifts by as many bits as a word has */
-enum { MOST_COUNT = 100000 };   /* counts of techniques are added before they are refused */
+enum { MOST_STRATA = 2 };     /* more than 2^30 strata: a permutation shifts by as many bits as a word has */
+enum { MOST_COUNT = 100000 }; /* counts of techniques are added before they are refused */
 #define LARGE_IMAGE "4000 4000" /* memory is asked for before the file is found too short */
 #endif
 
@@ -31,8 +31,9 @@ static int one_in(uint32_t n) { return below(n) == 0; }
 /* A double of any kind: the worst ones often, ordinary ones half of the time. */
 static double hostile(void)
 {
-    static const double worst[24] = {0,     -0.0,  1,      -1,    0.5,  2,      1e-45, 5e-324, 1.17549435e-38, 3.4028234e38, 1e300, -1e300,
-                                     1e18,  1e19,  -1e18,  1e-18, 1e9,  -1e9,   1e30,  0x1p-24, 1 + 0x1p-23,    0x1p31,       -0x1p31, 1e-9};
+    static const double worst[24] = {
+        0,    -0.0, 1,     -1,    0.5, 2,    1e-45, 5e-324,  1.17549435e-38, 3.4028234e38, 1e300,   -1e300,
+        1e18, 1e19, -1e18, 1e-18, 1e9, -1e9, 1e30,  0x1p-24, 1 + 0x1p-23,    0x1p31,       -0x1p31, 1e-9};
     const uint32_t kind = below(16);
     uint64_t bits;
     double x;
@@ -49,7 +50,8 @@ static double hostile(void)
 static pt_real hostile_real(void)
 {
     const double x = hostile();
-    if (sizeof(pt_real) == sizeof(float) && fabs(x) > 3.4028234e38 && fabs(x) < HUGE_VAL) return (pt_real)(x > 0 ? HUGE_VAL : -HUGE_VAL);
+    if (sizeof(pt_real) == sizeof(float) && fabs(x) > 3.4028234e38 && fabs(x) < HUGE_VAL)
+        return (pt_real)(x > 0 ? HUGE_VAL : -HUGE_VAL);
     return (pt_real)x;
 }
 static int hostile_int(void)
@@ -81,9 +83,13 @@ static pt_vec3 mild3(void)
 }
 static pt_rgb mild_rgb(void)
 {
-    return one_in(40) ? hostile_rgb() : pt_rgb_grey((pt_real)(one_in(3) ? (double)below(2) : pt_pcg32_double(&rng)));
+    return one_in(40) ? hostile_rgb()
+                      : pt_rgb_grey((pt_real)(one_in(3) ? (double)below(2) : pt_pcg32_double(&rng)));
 }
-static pt_real mild_real(double most) { return one_in(30) ? hostile_real() : (pt_real)(most * pt_pcg32_double(&rng)); }
+static pt_real mild_real(double most)
+{
+    return one_in(30) ? hostile_real() : (pt_real)(most * pt_pcg32_double(&rng));
+}
 static pt_ray hostile_ray(void)
 {
     pt_ray ray;
@@ -101,7 +107,8 @@ static void shapes(void)
     double t = 0, b[2] = {0, 0};
     pt_ray next;
     if (pt_intersect_sphere(&ray, hostile3(), hostile_real(), &t)) wrong += !(t > 0 && t < HUGE_VAL);
-    if (pt_intersect_triangle(&ray, hostile3(), hostile3(), hostile3(), &t, b)) wrong += !(t > 0 && t < HUGE_VAL && b[0] >= 0 && b[1] >= 0);
+    if (pt_intersect_triangle(&ray, hostile3(), hostile3(), hostile3(), &t, b))
+        wrong += !(t > 0 && t < HUGE_VAL && b[0] >= 0 && b[1] >= 0);
     (void)pt_intersect_box(&ray, hostile3(), hostile3());
     next = pt_spawn_ray(hostile3(), hostile3(), hostile3(), hostile3());
     next = pt_spawn_ray_to(next.o, hostile3(), hostile3(), hostile3(), hostile3(), hostile3());
@@ -128,7 +135,9 @@ static void samplers(void)
     pt_vec2 u;
     int i;
     for (i = 0; i < 4; i++) given[i] = hostile();
-    s = one_in(4) ? pt_sampler_make_given(given, below(5)) : pt_sampler_make((pt_sampler_kind)below(3), pt_pcg32_next(&rng), pt_pcg32_next(&rng) >> (MOST_STRATA + below(32 - MOST_STRATA)));
+    s = one_in(4) ? pt_sampler_make_given(given, below(5))
+                  : pt_sampler_make((pt_sampler_kind)below(3), pt_pcg32_next(&rng),
+                                    pt_pcg32_next(&rng) >> (MOST_STRATA + below(32 - MOST_STRATA)));
     pt_sampler_start(&s, pt_pcg32_next(&rng), pt_pcg32_next(&rng));
     for (i = 0; i < 6; i++) {
         u = pt_sampler_2d(&s);
@@ -187,7 +196,8 @@ static double hostile_density(const double *x, void *user)
 static void estimates(void)
 {
     pt_integral p = {hostile_integrand, NULL, 1, 64, PT_SAMPLER_SOBOL, 1};
-    const pt_technique technique[2] = {{hostile_warp, hostile_density, NULL}, {hostile_warp, hostile_density, NULL}};
+    const pt_technique technique[2] = {{hostile_warp, hostile_density, NULL},
+                                       {hostile_warp, hostile_density, NULL}};
     int counts[2];
     double shares[2];
     pt_estimate out;
@@ -202,7 +212,8 @@ static void estimates(void)
     (void)pt_estimate_antithetic(&p, &out);
     (void)pt_estimate_importance(&p, technique, &out);
     (void)pt_estimate_control(&p, hostile_integrand, hostile(), hostile(), &out);
-    (void)pt_estimate_mis(&p, technique, counts, one_in(4) ? hostile_int() % 3 : 2, (pt_heuristic)below(3), &out);
+    (void)pt_estimate_mis(&p, technique, counts, one_in(4) ? hostile_int() % 3 : 2, (pt_heuristic)below(3),
+                          &out);
     (void)pt_estimate_mis_one(&p, technique, shares, 2, (pt_heuristic)below(3), &out);
     (void)pt_estimate_roulette(&p, hostile(), &out);
     (void)pt_estimate_splitting(&p, one_in(2) ? hostile_int() : 1, one_in(2) ? hostile_int() % 100 : 2, &out);
@@ -311,7 +322,8 @@ static void trees(void)
     uint32_t i;
     pt_bvh bvh;
     for (i = 0; i < n; i++) { /* finite and in order, as promised by the caller */
-        const pt_vec3 p = pt_v3((pt_real)ldexp(pt_pcg32_double(&rng), (int)below(60) - 30), (pt_real)(int)below(3), (pt_real)1e18);
+        const pt_vec3 p = pt_v3((pt_real)ldexp(pt_pcg32_double(&rng), (int)below(60) - 30),
+                                (pt_real)(int)below(3), (pt_real)1e18);
         lo[i] = p;
         hi[i] = pt_v3_add(p, pt_v3((pt_real)below(2), 0, (pt_real)(1e18 * below(2))));
     }
@@ -334,7 +346,8 @@ static void expressions(void)
         text[i][n] = '\0';
         list[i] = text[i];
     }
-    if (pt_lpe_compile(&lpe, list, one_in(8) ? hostile_int() % 5 : 1 + (int)below(4), &error) == PT_OK) (void)pt_lpe_class(&lpe, text[3]);
+    if (pt_lpe_compile(&lpe, list, one_in(8) ? hostile_int() % 5 : 1 + (int)below(4), &error) == PT_OK)
+        (void)pt_lpe_class(&lpe, text[3]);
 }
 #endif
 
@@ -378,22 +391,41 @@ static void hostile_item(pt_scene *scene, int materials)
 {
     const int m = one_in(60) ? hostile_int() : (int)below((uint32_t)materials + (materials == 0));
     switch (below(9)) {
-    case 0: pt_add_sphere(scene, mild3(), mild_real(1), m); break;
-    case 1: pt_add_parallelogram(scene, mild3(), mild3(), mild3(), m); break;
-    case 2: pt_add_triangle(scene, mild3(), mild3(), mild3(), m); break;
-    case 3: pt_add_quad(scene, mild3(), mild3(), mild3(), mild3(), m); break;
-    case 4: hostile_mesh(scene, m); break;
-    case 5: pt_add_point_light(scene, mild3(), mild_rgb()); break;
-    case 6: pt_add_spot_light(scene, mild3(), mild3(), mild_rgb(), one_in(9) ? hostile() : 10, one_in(9) ? hostile() : 30); break;
-    case 7: pt_add_directional_light(scene, mild3(), mild_rgb()); break;
+    case 0:
+        pt_add_sphere(scene, mild3(), mild_real(1), m);
+        break;
+    case 1:
+        pt_add_parallelogram(scene, mild3(), mild3(), mild3(), m);
+        break;
+    case 2:
+        pt_add_triangle(scene, mild3(), mild3(), mild3(), m);
+        break;
+    case 3:
+        pt_add_quad(scene, mild3(), mild3(), mild3(), mild3(), m);
+        break;
+    case 4:
+        hostile_mesh(scene, m);
+        break;
+    case 5:
+        pt_add_point_light(scene, mild3(), mild_rgb());
+        break;
+    case 6:
+        pt_add_spot_light(scene, mild3(), mild3(), mild_rgb(), one_in(9) ? hostile() : 10,
+                          one_in(9) ? hostile() : 30);
+        break;
+    case 7:
+        pt_add_directional_light(scene, mild3(), mild_rgb());
+        break;
     default:
 #if PTI_HAS_ENVIRONMENT
-        if (one_in(2)) pt_set_environment(scene, mild_rgb());
+        if (one_in(2))
+            pt_set_environment(scene, mild_rgb());
         else {
             float rgb[24];
             int i;
             for (i = 0; i < 24; i++) rgb[i] = one_in(200) ? (float)hostile_real() : (float)below(3);
-            pt_set_environment_image(scene, rgb, one_in(20) ? hostile_int() % 3 : 4, one_in(20) ? hostile_int() % 3 : 2, one_in(9) ? hostile() : 1);
+            pt_set_environment_image(scene, rgb, one_in(20) ? hostile_int() % 3 : 4,
+                                     one_in(20) ? hostile_int() % 3 : 2, one_in(9) ? hostile() : 1);
         }
 #endif
         break;
@@ -402,7 +434,8 @@ static void hostile_item(pt_scene *scene, int materials)
 
 static void ask_scene(const pt_scene *scene)
 {
-    const pt_ray ray = one_in(2) ? hostile_ray() : pt_spawn_ray(mild3(), pt_v3(0, 0, 0), pt_v3(0, 1, 0), mild3());
+    const pt_ray ray =
+        one_in(2) ? hostile_ray() : pt_spawn_ray(mild3(), pt_v3(0, 0, 0), pt_v3(0, 1, 0), mild3());
     pt_light_sample_result ls;
     pt_light_emission_result le;
     pt_bsdf_sample_result bs;
@@ -423,7 +456,8 @@ static void ask_scene(const pt_scene *scene)
         const pt_real x = pt_real_from_u32(pt_pcg32_next(&rng)), y = pt_real_from_u32(pt_pcg32_next(&rng));
         (void)pt_light_choose(scene, pt_pcg32_double(&rng), &a);
         (void)pt_light_sample(scene, light, one_in(2) ? hostile3() : mild3(), pt_v2(x, y), &ls);
-        if (pt_light_sample_le(scene, light, pt_v2(x, y), pt_v2(y, x), x, &le)) pt_light_pdf_le(scene, light, le.n, le.w, &a, &w);
+        if (pt_light_sample_le(scene, light, pt_v2(x, y), pt_v2(y, x), x, &le))
+            pt_light_pdf_le(scene, light, le.n, le.w, &a, &w);
     }
 }
 
@@ -525,8 +559,10 @@ static void films(void)
         pt_film_free(&a);
         return;
     }
-    for (i = 0; i < 4; i++) (void)pt_film_add_range(&a, pt_pcg32_next(&rng) >> below(32), pt_pcg32_next(&rng) >> below(32));
-    for (i = 0; i < 4; i++) (void)pt_splat_add(&list, below((uint32_t)(a.width * a.height)), below(2), hostile_rgb());
+    for (i = 0; i < 4; i++)
+        (void)pt_film_add_range(&a, pt_pcg32_next(&rng) >> below(32), pt_pcg32_next(&rng) >> below(32));
+    for (i = 0; i < 4; i++)
+        (void)pt_splat_add(&list, below((uint32_t)(a.width * a.height)), below(2), hostile_rgb());
     (void)pt_film_add_splats(&a, &list);
     (void)pt_film_merge(&a, &b);
     (void)pt_film_make_classes(&a, hostile_int() % 20);
@@ -541,7 +577,9 @@ static void films(void)
 #if PTI_HAS_FILES
 static void files(void)
 {
-    static const char *const heads[6] = {"P6\n3 2\n255\n", "PF\n3 2\n-1.0\n", "PF\n3 2\n1.0\n", "P6\n" LARGE_IMAGE "\n255\n", "PF\n-3 2\n0\n", "P6 # x\n99999999999 1\n65536\n"};
+    static const char *const heads[6] = {"P6\n3 2\n255\n", "PF\n3 2\n-1.0\n",
+                                         "PF\n3 2\n1.0\n", "P6\n" LARGE_IMAGE "\n255\n",
+                                         "PF\n-3 2\n0\n",  "P6 # x\n99999999999 1\n65536\n"};
     const char *const path = "build/fuzz.bin";
     unsigned char bytes[160];
     size_t n = strlen(heads[0]);
@@ -556,8 +594,10 @@ static void files(void)
     for (k = below(4); k > 0; k--) bytes[below(20)] = (unsigned char)below(256);
     (void)fwrite(bytes, 1, length, file);
     fclose(file);
-    if (pt_read_image(path, &image) == PT_OK) wrong += image.rgb == NULL || image.width < 1 || image.height < 1;
-    else wrong += image.rgb != NULL;
+    if (pt_read_image(path, &image) == PT_OK)
+        wrong += image.rgb == NULL || image.width < 1 || image.height < 1;
+    else
+        wrong += image.rgb != NULL;
     pt_image_free(&image);
     remove(path);
 }
@@ -566,8 +606,8 @@ static void files(void)
 typedef struct target {
     const char *name;
     void (*call)(void);
-    int often;      /* calls in a turn */
-    int functions;  /* public functions that a call makes, about */
+    int often;     /* calls in a turn */
+    int functions; /* public functions that a call makes, about */
 } target;
 
 static const target TARGETS[] = {{"shapes and rays", shapes, 64, 6},

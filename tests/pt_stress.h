@@ -28,12 +28,12 @@
 
 static struct {
     const char *group;
-    double x, y;           /* scale or offset of the case; 0 = it stands in no series */
-    const char *limit;     /* why the bound cannot hold */
-    double limit_at;       /* and how large the error may be then */
-    long nan;              /* NaN, infinite or dropped contributions since the last row */
+    double x, y;       /* scale or offset of the case; 0 = it stands in no series */
+    const char *limit; /* why the bound cannot hold */
+    double limit_at;   /* and how large the error may be then */
+    long nan;          /* NaN, infinite or dropped contributions since the last row */
     double clock;
-    int limits;            /* rows with that verdict */
+    int limits; /* rows with that verdict */
 } STRESS;
 
 /* How many of something: all in the long form. */
@@ -68,8 +68,8 @@ static inline void told(const char *name, const char *quantity, double got, doub
         const char *const word = pt_test_count(good || known);
         STRESS.limits += known;
         if (STRESS_LONG || pt_test.is_verbose || !(good || known))
-            printf("row|%s|%s|%s|%.6g|%.6g|%.17g|%.17g|%.4g|%s|%.4g|%s|%ld|%.3f|%s\n", STRESS.group, name, quantity,
-                   STRESS.x, STRESS.y, got, exact, error, unit, bound, verdict, STRESS.nan, seconds,
+            printf("row|%s|%s|%s|%.6g|%.6g|%.17g|%.17g|%.4g|%s|%.4g|%s|%ld|%.3f|%s\n", STRESS.group, name,
+                   quantity, STRESS.x, STRESS.y, got, exact, error, unit, bound, verdict, STRESS.nan, seconds,
                    known ? STRESS.limit : "");
         if (!(good || known))
             printf("%s %s: %s: %s got %.17g, exact %.17g, error %.4g %s, bound %.4g, %ld not finite\n", word,
@@ -92,7 +92,8 @@ static inline void told_error(const char *name, const char *quantity, double got
     told(name, quantity, got, exact, error, unit, bound);
 }
 
-static inline void told_relative(const char *name, const char *quantity, double got, double exact, double bound)
+static inline void told_relative(const char *name, const char *quantity, double got, double exact,
+                                 double bound)
 {
     const double error = got - exact != 0 ? fabs(got - exact) / fabs(exact) : 0; /* 0 for 0: exactly */
     told_error(name, quantity, got, exact, error, "rel", bound);
@@ -100,7 +101,8 @@ static inline void told_relative(const char *name, const char *quantity, double 
 
 /* Is a mean the exact value, known up to exact_error? In standard errors; the level is that of the harness. The row
    is one of its own that says what bias it would have seen: no more than `power`, relative. */
-static inline void told_mean(const char *name, const pt_stats *s, double exact, double exact_error, double power)
+static inline void told_mean(const char *name, const pt_stats *s, double exact, double exact_error,
+                             double power)
 {
     const double own = pt_stats_standard_error(s);
     const double se = sqrt(own * own + exact_error * exact_error + 0x1p-100 * exact * exact);

@@ -56,7 +56,10 @@ static whole draw3(pt_pcg32 *rng, int64_t most)
     const int64_t x = draw(rng, most), y = draw(rng, most);
     return whole3(x, y, draw(rng, most));
 }
-static double between(pt_pcg32 *rng, double low, double high) { return low + (high - low) * pt_pcg32_double(rng); }
+static double between(pt_pcg32 *rng, double low, double high)
+{
+    return low + (high - low) * pt_pcg32_double(rng);
+}
 static pt_vec3 direction(pt_pcg32 *rng)
 {
     const double z = between(rng, -1, 1), phi = between(rng, 0, 2 * PT_PI), r = sqrt((1 - z) * (1 + z));
@@ -66,14 +69,19 @@ static pt_vec3 direction(pt_pcg32 *rng)
 /* Scale and translation of the cases; what a scale is called in the tables is the power of ten next to it. */
 typedef struct place {
     const char *name;
-    int exponent;          /* of two */
-    int64_t away;          /* translation in units of the scale */
+    int exponent; /* of two */
+    int64_t away; /* translation in units of the scale */
 } place;
-static const place PLACES[] = {
-    {"scale 1e-6", -20, 0},     {"scale 1e-3", -10, 0},     {"scale 1", 0, 0},
-    {"scale 1e3", 10, 0},       {"scale 1e6", 20, 0},       {"translated 1e5", 0, 100000},
-    {"translated 1e6", 0, 1000000}, {"translated 1e7", 0, 10000000}, {"scale 1e-45", -149, 0},
-    {"scale 1e30", 100, 0}};
+static const place PLACES[] = {{"scale 1e-6", -20, 0},
+                               {"scale 1e-3", -10, 0},
+                               {"scale 1", 0, 0},
+                               {"scale 1e3", 10, 0},
+                               {"scale 1e6", 20, 0},
+                               {"translated 1e5", 0, 100000},
+                               {"translated 1e6", 0, 1000000},
+                               {"translated 1e7", 0, 10000000},
+                               {"scale 1e-45", -149, 0},
+                               {"scale 1e30", 100, 0}};
 enum { PLACE_COUNT = sizeof PLACES / sizeof PLACES[0] };
 
 static void stand_at(const place *p)
@@ -157,7 +165,8 @@ static double try_triangle(const trial *q, const place *p, int *wrong)
 {
     const double s = ldexp(1, p->exponent);
     const whole o = whole3(p->away, -p->away, p->away / 2);
-    const pt_vec3 a = at_scale(plus(q->a, o), s), b = at_scale(plus(q->b, o), s), c = at_scale(plus(q->c, o), s);
+    const pt_vec3 a = at_scale(plus(q->a, o), s), b = at_scale(plus(q->b, o), s),
+                  c = at_scale(plus(q->c, o), s);
     const pt_ray ray = ray_from(at_scale(o, s), at_scale(q->d, p->exponent < -100 ? s : 1));
     double t = 0, w[2], exact = 0, bound;
     const double unit = p->exponent < -100 ? 1 : s; /* of t */
@@ -176,7 +185,11 @@ static double try_triangle(const trial *q, const place *p, int *wrong)
     ww = pti_edge(y.x, x.y, y.y, x.x);
     bound = pti_depth_error(&r, x, y, z, u, v, ww) / fabs(u + v + ww) + 4 * PTI_2_M53 * t;
     /* det has its own error, as large as that of an edge function: it counts with t */
-    bound += t * 3 * (2 * PTI_2_M53 * fabs(u + v + ww) + 44 * PTI_2_M53 * fmax(fabs(x.x), fmax(fabs(y.x), fabs(z.x))) * fmax(fabs(x.y), fmax(fabs(y.y), fabs(z.y)))) / fabs(u + v + ww);
+    bound +=
+        t * 3 *
+        (2 * PTI_2_M53 * fabs(u + v + ww) + 44 * PTI_2_M53 * fmax(fabs(x.x), fmax(fabs(y.x), fabs(z.x))) *
+                                                fmax(fabs(x.y), fmax(fabs(y.y), fabs(z.y)))) /
+        fabs(u + v + ww);
     return fabs(t - exact * unit) / bound;
 }
 
@@ -220,7 +233,8 @@ static void shared_edges(void)
         for (i = 0; i < n; i++) {
             const whole a = draw3(&rng, WHOLE_MOST / 2), b = draw3(&rng, WHOLE_MOST / 2), d = plus(a, b);
             const whole c = draw3(&rng, WHOLE_MOST), e = draw3(&rng, WHOLE_MOST);
-            const int64_t side = triple(d, minus(b, a), minus(c, a)), other = triple(d, minus(b, a), minus(e, a));
+            const int64_t side = triple(d, minus(b, a), minus(c, a)),
+                          other = triple(d, minus(b, a), minus(e, a));
             const pt_ray ray = ray_from(at_scale(o, s), at_scale(d, PLACES[p].exponent < -100 ? s : 1));
             double t, w[2];
             pt_vec3 v[4];
@@ -234,7 +248,8 @@ static void shared_edges(void)
                      !pt_intersect_triangle(&ray, v[1], v[0], v[3], &t, w);
         }
         stand_at(&PLACES[p]);
-        told_count(label("shared edge, %s", PLACES[p].name), "leaks", asked > n / 4 ? leaks : HUGE_VAL, asked);
+        told_count(label("shared edge, %s", PLACES[p].name), "leaks", asked > n / 4 ? leaks : HUGE_VAL,
+                   asked);
     }
 }
 
@@ -261,7 +276,8 @@ static void spheres(void)
             double t = 0, exact, root, bound;
             const int got = pt_intersect_sphere(&ray, at_scale(o, s), real((double)r * s), &t);
             int want;
-            if (a == 0 || disc == 0 || c == 0) continue; /* tangents, and origins on the sphere: by convention */
+            if (a == 0 || disc == 0 || c == 0)
+                continue; /* tangents, and origins on the sphere: by convention */
             want = disc > 0 && (c < 0 || b > 0);
             wrong += got != want;
             if (!got || !want) continue;
@@ -270,7 +286,8 @@ static void spheres(void)
             exact = c < 0 ? (b < 0 ? -(double)c / (root - (double)b) : ((double)b + root) / (double)a)
                           : (double)c / ((double)b + root);
             /* 16 roundings of the distances; and those of l, 4 of |f|, as the root amplifies them */
-            bound = PTI_2_M53 * (16 + 8 * sqrt((double)a) * (double)r / root) * (sqrt((double)inner(f, f)) + (double)r) / sqrt((double)a);
+            bound = PTI_2_M53 * (16 + 8 * sqrt((double)a) * (double)r / root) *
+                    (sqrt((double)inner(f, f)) + (double)r) / sqrt((double)a);
             worst = fmax(worst, fabs(t / unit - exact) / bound);
         }
         stand_at(&PLACES[p]);
@@ -284,7 +301,8 @@ static void spheres(void)
 static int meets_box(const int64_t lo[3], const int64_t hi[3], const int64_t d[3])
 {
     int j, k;
-    for (j = 0; j < 3; j++) { /* intervals [near, far] / |d|, all with far >= 0, near / |d| <= far / |d| of others */
+    for (j = 0; j < 3;
+         j++) { /* intervals [near, far] / |d|, all with far >= 0, near / |d| <= far / |d| of others */
         const int64_t far = d[j] > 0 ? hi[j] : -lo[j];
         if (d[j] == 0 && (lo[j] > 0 || hi[j] < 0)) return 0;
         if (d[j] == 0) continue;
@@ -313,13 +331,15 @@ static void boxes(void)
             int got, want;
             for (k = 0; k < 3; k++) {
                 const int64_t a = draw(&rng, 1023), b = pt_pcg32_next(&rng) % 8 ? draw(&rng, 1023) : a;
-                const unsigned how = pt_pcg32_next(&rng) % 8; /* flat boxes, axis-parallel rays, aims at corners */
+                const unsigned how =
+                    pt_pcg32_next(&rng) % 8; /* flat boxes, axis-parallel rays, aims at corners */
                 lo[k] = a < b ? a : b;
                 hi[k] = a < b ? b : a;
                 d[k] = how == 0 ? 0 : how < 4 ? lo[k] : how < 6 ? hi[k] : draw(&rng, 1023);
             }
             if (d[0] == 0 && d[1] == 0 && d[2] == 0) continue;
-            ray = ray_from(at_scale(o, s), at_scale(whole3(d[0], d[1], d[2]), PLACES[p].exponent < -100 ? s : 1));
+            ray = ray_from(at_scale(o, s),
+                           at_scale(whole3(d[0], d[1], d[2]), PLACES[p].exponent < -100 ? s : 1));
             if (d[0] == 0 && i % 2) ray.d.x = -ray.d.x; /* -0 */
             want = meets_box((const int64_t *)lo, (const int64_t *)hi, (const int64_t *)d);
             got = pt_intersect_box(&ray, at_scale(plus(o, whole3(lo[0], lo[1], lo[2])), s),
@@ -331,8 +351,10 @@ static void boxes(void)
         stand_at(&PLACES[p]);
         told_count(label("box, %s", PLACES[p].name), "false misses", missed, n);
         stand_at(&PLACES[p]);
-        if (PLACES[p].exponent < -100) limited("1/d overflows where |d| < 2^-128: the slab is unbounded, which is conservative", 1);
-        told(label("box, %s", PLACES[p].name), "false hits, of 1", (double)extra / empty, 0, (double)extra / empty, "share", 0.001);
+        if (PLACES[p].exponent < -100)
+            limited("1/d overflows where |d| < 2^-128: the slab is unbounded, which is conservative", 1);
+        told(label("box, %s", PLACES[p].name), "false hits, of 1", (double)extra / empty, 0,
+             (double)extra / empty, "share", 0.001);
     }
 }
 
@@ -363,9 +385,9 @@ static ball make_ball(uint32_t rings, uint32_t columns, pt_vec3 centre, double r
     for (i = 1; i < rings; i++)
         for (j = 0; j < columns; j++) {
             const double theta = PT_PI * i / rings, phi = 2 * PT_PI * j / columns;
-            b.v[b.vertices++] = v3((double)centre.x + radius * sin(theta) * cos(phi),
-                                   (double)centre.y + radius * cos(theta),
-                                   (double)centre.z + radius * sin(theta) * sin(phi));
+            b.v[b.vertices++] =
+                v3((double)centre.x + radius * sin(theta) * cos(phi), (double)centre.y + radius * cos(theta),
+                   (double)centre.z + radius * sin(theta) * sin(phi));
         }
     b.v[b.vertices++] = v3((double)centre.x, (double)centre.y + radius, (double)centre.z);
     b.v[b.vertices++] = v3((double)centre.x, (double)centre.y - radius, (double)centre.z);
@@ -393,7 +415,7 @@ typedef struct siege {
     const ball *b;
     pt_vec3 centre;
     double radius;
-    int rays;                  /* in a chunk */
+    int rays; /* in a chunk */
     long escaped[256];
 } siege;
 
@@ -442,8 +464,9 @@ static void closed_mesh(void)
         for (k = 0; k < 256; k++) escaped += s.escaped[k];
         STRESS.x = radius[c];
         STRESS.y = away[c] / radius[c];
-        told_count(label("%lu triangles, radius %g, %g radii away", (unsigned long)b.triangles, radius[c], STRESS.y),
-                   "rays that escape", (double)escaped, 256.0 * s.rays);
+        told_count(
+            label("%lu triangles, radius %g, %g radii away", (unsigned long)b.triangles, radius[c], STRESS.y),
+            "rays that escape", (double)escaped, 256.0 * s.rays);
         free_ball(&b);
         pt_scene_free(&scene);
     }
@@ -455,7 +478,8 @@ static void closed_mesh(void)
 /* NaN, infinity, zeros and denormals in every place of ray and shape: an answer, and no hit at a t that is none. */
 static void hostile_numbers(void)
 {
-    const double bad[7] = {HUGE_VAL - HUGE_VAL, HUGE_VAL, -HUGE_VAL, 0, -0.0, is_float() ? 1e-45 : 5e-324, 3e38};
+    const double bad[7] = {HUGE_VAL - HUGE_VAL,         HUGE_VAL, -HUGE_VAL, 0, -0.0,
+                           is_float() ? 1e-45 : 5e-324, 3e38};
     int i, k, wrong = 0, asked = 0;
     begin_group("shapes");
     for (i = 0; i < 7; i++)
@@ -469,7 +493,8 @@ static void hostile_numbers(void)
             if (pt_intersect_triangle(&ray, pt_v3(n[6], n[7], n[8]), pt_v3(n[9], n[10], n[11]),
                                       pt_v3(n[12], n[13], n[14]), &t, b))
                 wrong += !(t > 0 && t < HUGE_VAL && b[0] >= 0 && b[1] >= 0 && b[0] + b[1] <= 1 + 1e-15);
-            if (pt_intersect_sphere(&ray, pt_v3(n[15], n[16], n[17]), n[18], &t)) wrong += !(t > 0 && t < HUGE_VAL);
+            if (pt_intersect_sphere(&ray, pt_v3(n[15], n[16], n[17]), n[18], &t))
+                wrong += !(t > 0 && t < HUGE_VAL);
             (void)pt_intersect_box(&ray, pt_v3(n[6], n[7], n[8]), pt_v3(n[9], n[10], n[11]));
         }
     told_count("NaN, infinity, zero, denormal", "hits that are none", wrong, asked);
@@ -483,17 +508,20 @@ static const char *const FURNACE_NAMES[FURNACES] = {"sphere", "box", "box of tri
 /* A closed furnace of the given size around a centre, albedo 1/2, emission 1: radiance 2 everywhere. */
 static pt_scene make_furnace(int kind, pt_vec3 c, double size)
 {
-    static const unsigned char face[12][3] = {{0, 1, 3}, {0, 3, 2}, {4, 6, 7}, {4, 7, 5}, {0, 4, 5}, {0, 5, 1},
-                                              {2, 3, 7}, {2, 7, 6}, {0, 2, 6}, {0, 6, 4}, {1, 5, 7}, {1, 7, 3}};
+    static const unsigned char face[12][3] = {{0, 1, 3}, {0, 3, 2}, {4, 6, 7}, {4, 7, 5},
+                                              {0, 4, 5}, {0, 5, 1}, {2, 3, 7}, {2, 7, 6},
+                                              {0, 2, 6}, {0, 6, 4}, {1, 5, 7}, {1, 7, 3}};
     const double h = size / 2;
     pt_scene scene = PT_SCENE_INIT;
     const int m = glowing(&scene, 0.5, 1);
     pt_vec3 v[8];
     int k;
     for (k = 0; k < 8; k++)
-        v[k] = v3((double)c.x + (k & 1 ? h : -h), (double)c.y + (k & 2 ? h : -h), (double)c.z + (k & 4 ? h : -h));
+        v[k] = v3((double)c.x + (k & 1 ? h : -h), (double)c.y + (k & 2 ? h : -h),
+                  (double)c.z + (k & 4 ? h : -h));
     if (kind == BALL) pt_add_sphere(&scene, c, real(h), m);
-    for (k = 0; kind == MESH_BOX && k < 12; k++) pt_add_triangle(&scene, v[face[k][0]], v[face[k][1]], v[face[k][2]], m);
+    for (k = 0; kind == MESH_BOX && k < 12; k++)
+        pt_add_triangle(&scene, v[face[k][0]], v[face[k][1]], v[face[k][2]], m);
     for (k = 0; kind == BOX && k < 3; k++) { /* normals look inwards */
         const pt_vec3 e[3] = {v3(size, 0, 0), v3(0, size, 0), v3(0, 0, size)};
         pt_add_parallelogram(&scene, v[0], e[(k + 1) % 3], e[(k + 2) % 3], m);
@@ -521,8 +549,9 @@ static int broken_paths(const pt_scene *scene, pt_vec3 c, double size, int n)
     options.max_edges = 12;
     options.roulette = PT_ROULETTE_NONE;
     for (i = 0; i < n; i++) {
-        const pt_vec3 from = v3((double)c.x + size * between(&rng, -0.2, 0.2), (double)c.y + size * between(&rng, -0.2, 0.2),
-                                (double)c.z + size * between(&rng, -0.2, 0.2));
+        const pt_vec3 from =
+            v3((double)c.x + size * between(&rng, -0.2, 0.2), (double)c.y + size * between(&rng, -0.2, 0.2),
+               (double)c.z + size * between(&rng, -0.2, 0.2));
         const pt_ray ray = ray_from(from, direction(&rng));
         pt_li_info info = {0};
         double v;
@@ -592,7 +621,8 @@ static void lit_furnaces(void)
                 }
                 STRESS.x = size[s];
                 STRESS.y = away[o];
-                told_mean(label("%s lit, size %.0e, %.0e away", FURNACE_NAMES[kind], size[s], away[o]), &st, 2, 0, 0.04);
+                told_mean(label("%s lit, size %.0e, %.0e away", FURNACE_NAMES[kind], size[s], away[o]), &st,
+                          2, 0, 0.04);
                 pt_scene_free(&scene);
             }
     STRESS.x = STRESS.y = 0;
@@ -603,8 +633,9 @@ static void lit_furnaces(void)
 #if PTI_HAS_BVH
 enum { NONE, ONE, TWO, IDENTICAL, DEGENERATE, GIANT, CHAIN, GEOMETRIC, SOUP, GROVES };
 static const char *const GROVE_NAMES[GROVES] = {
-    "no primitive",      "one primitive",    "two primitives",       "identical triangles", "no area",
-    "a giant among tiny", "a chain of 2^-i", "a geometric chain", "soup"};
+    "no primitive",        "one primitive",     "two primitives",
+    "identical triangles", "no area",           "a giant among tiny",
+    "a chain of 2^-i",     "a geometric chain", "soup"};
 
 static void add_corner(pt_scene *scene, double x, double y, double z, double size, int m)
 {
@@ -613,18 +644,34 @@ static void add_corner(pt_scene *scene, double x, double y, double z, double siz
 
 static int plant(pt_scene *scene, int grove, int n)
 {
-    const int m = wall(scene, 0.5), count = grove == NONE ? 0 : grove == ONE ? 1 : grove == TWO ? 2 : grove == CHAIN ? 120 : n;
+    const int m = wall(scene, 0.5), count = grove == NONE    ? 0
+                                            : grove == ONE   ? 1
+                                            : grove == TWO   ? 2
+                                            : grove == CHAIN ? 120
+                                                             : n;
     pt_pcg32 rng = pt_pcg32_make(906, 0);
     int i;
     for (i = 0; i < count; i++) {
         const double x = between(&rng, -1, 1), y = between(&rng, -1, 1), z = between(&rng, -1, 1);
         switch (grove) {
-        case IDENTICAL: add_corner(scene, -0.5, -0.5, -0.5, 1, m); break;
-        case DEGENERATE: pt_add_triangle(scene, v3(x, y, z), v3(x, y, z), v3(y, z, x), m); break;
-        case GIANT: add_corner(scene, i ? x : -1e6, i ? y : -1e6, i ? z : -1e6, i ? 0.01 : 2e6, m); break;
-        case CHAIN: add_corner(scene, ldexp(1, -i), 0, 0, ldexp(0.5, -i), m); break;
-        case GEOMETRIC: add_corner(scene, pow(1.0001, -i), 0, 0, pow(1.0001, -i), m); break;
-        default: add_corner(scene, x, y, z, grove == SOUP ? 0.03 : 1, m); break;
+        case IDENTICAL:
+            add_corner(scene, -0.5, -0.5, -0.5, 1, m);
+            break;
+        case DEGENERATE:
+            pt_add_triangle(scene, v3(x, y, z), v3(x, y, z), v3(y, z, x), m);
+            break;
+        case GIANT:
+            add_corner(scene, i ? x : -1e6, i ? y : -1e6, i ? z : -1e6, i ? 0.01 : 2e6, m);
+            break;
+        case CHAIN:
+            add_corner(scene, ldexp(1, -i), 0, 0, ldexp(0.5, -i), m);
+            break;
+        case GEOMETRIC:
+            add_corner(scene, pow(1.0001, -i), 0, 0, pow(1.0001, -i), m);
+            break;
+        default:
+            add_corner(scene, x, y, z, grove == SOUP ? 0.03 : 1, m);
+            break;
         }
     }
     return count;
@@ -671,12 +718,14 @@ static void trees(void)
         STRESS.x = count;
         told(GROVE_NAMES[g], "CPU seconds to build", seconds, 0, seconds, "s", most);
         STRESS.x = count;
-        told(GROVE_NAMES[g], "depth of the tree", scene.bvh.depth, 0, scene.bvh.depth, "levels", PT_BVH_MAX_DEPTH);
+        told(GROVE_NAMES[g], "depth of the tree", scene.bvh.depth, 0, scene.bvh.depth, "levels",
+             PT_BVH_MAX_DEPTH);
         rays = (int)fmax(32, fmin(many(100000, 2000), many(100000000, 2000000) / (double)(count + 1)));
         other = other_hits(&scene, rays, &hits);
         STRESS.x = count;
         told_count(GROVE_NAMES[g], "rays that find another hit than a linear search", other, rays);
-        if (g > TWO && g != DEGENERATE) told(GROVE_NAMES[g], "rays that hit", hits, 1, hits < 1, "at least 1", 0);
+        if (g > TWO && g != DEGENERATE)
+            told(GROVE_NAMES[g], "rays that hit", hits, 1, hits < 1, "at least 1", 0);
         pt_scene_free(&scene);
     }
     STRESS.x = 0;
@@ -725,9 +774,12 @@ static void bright_furnaces(void)
         }
         chi2 = 2 * s.n * s.mean / exact;
         p = pt_chi2_sf(chi2, 2 * s.n);
-        told_error(label("furnace, albedo 1 - %.0e", 1 - b.rho), "mean", s.mean, exact, 2 * fmin(p, 1 - p) < pt_test_level() ? HUGE_VAL : 0, "rejected", 0);
+        told_error(label("furnace, albedo 1 - %.0e", 1 - b.rho), "mean", s.mean, exact,
+                   2 * fmin(p, 1 - p) < pt_test_level() ? HUGE_VAL : 0, "rejected", 0);
         STRESS.x = 1 - b.rho;
-        if (STRESS_LONG) told("the same", "smallest bias that would be seen", 7.7 / sqrt(s.n), 0, 7.7 / sqrt(s.n), "rel", 0.5);
+        if (STRESS_LONG)
+            told("the same", "smallest bias that would be seen", 7.7 / sqrt(s.n), 0, 7.7 / sqrt(s.n), "rel",
+                 0.5);
     }
     STRESS.x = 0;
 }
@@ -758,7 +810,8 @@ static pt_stats floor_radiance(pt_scene *scene, pt_vec3 p, int n, uint64_t seed)
 
 static void add_floor(pt_scene *scene, double size)
 {
-    pt_add_parallelogram(scene, v3(-size, 0, -size), v3(0, 0, 2 * size), v3(2 * size, 0, 0), wall(scene, 0.5));
+    pt_add_parallelogram(scene, v3(-size, 0, -size), v3(0, 0, 2 * size), v3(2 * size, 0, 0),
+                         wall(scene, 0.5));
 }
 
 /* A ball of radius r and radiance 1 / r^2 at distance 1/2, 30 degrees off the normal: E = pi L r^2 / d^2 cos, and
@@ -779,7 +832,8 @@ static void tiny_lamps(void)
         s = floor_radiance(&scene, v3(0, 0, 0), many(20000, 1000), 750);
         STRESS.x = r[i];
         /* where the floor is met is rounded: by u of its size; cosine and density by a few u */
-        told_mean(label("lamp of radius %.0e, radiance %.0e", r[i], radiance), &s, exact, 16 * pt_gamma(1) * exact, 0.005);
+        told_mean(label("lamp of radius %.0e, radiance %.0e", r[i], radiance), &s, exact,
+                  16 * pt_gamma(1) * exact, 0.005);
     }
     STRESS.x = 0;
 }
@@ -819,7 +873,8 @@ static void dynamic_range(void)
     for (i = 0; i < STEPS; i++)
         pt_add_parallelogram(&scene, v3(i, 0, -1), v3(1, 0, 0), v3(0, 1, 0), lamp(&scene, pow(10, i - 9)));
     commit(&scene);
-    desc.camera = pt_camera_look_at(v3(0.5 * STEPS, 0.5, 9), v3(0.5 * STEPS, 0.5, -1), v3(0, 1, 0), real(2 * atan(0.05) * 180 / PT_PI));
+    desc.camera = pt_camera_look_at(v3(0.5 * STEPS, 0.5, 9), v3(0.5 * STEPS, 0.5, -1), v3(0, 1, 0),
+                                    real(2 * atan(0.05) * 180 / PT_PI));
     desc.width = STEPS;
     desc.height = 1;
     desc.spp = 64;
@@ -829,7 +884,8 @@ static void dynamic_range(void)
             const double exact = (double)real(pow(10, i - 9));
             worst = fmax(worst, fabs(pt_film_pixel(&film, i, 0).r / exact - 1));
         }
-    else worst = HUGE_VAL;
+    else
+        worst = HUGE_VAL;
     STRESS.nan += (long)film.nonfinite;
     told_error("radiance 1e-9 to 1e9 in one picture", "worst pixel", worst, 0, worst, "rel", 64 * 0x1p-53);
     pt_film_free(&film);
@@ -874,11 +930,15 @@ static void glass_balls(void)
             pt_scene scene = PT_SCENE_INIT;
             pt_stats s;
             pt_set_environment(&scene, grey(1));
-            pt_add_sphere(&scene, v3(0, 0, 0), 1, pt_add_material(&scene, pt_material_dielectric(real(ior[i]))));
+            pt_add_sphere(&scene, v3(0, 0, 0), 1,
+                          pt_add_material(&scene, pt_material_dielectric(real(ior[i]))));
             commit(&scene);
             s = radiance_along(&scene, o, d, many(2500000, 1000), 770 + (uint64_t)(3 * i + k));
             STRESS.x = n - 1;
-            told_mean(label("glass ball, index %.10g, camera %s", ior[i], k == 0 ? "outside" : k == 1 ? "inside" : "on it"),
+            told_mean(label("glass ball, index %.10g, camera %s", ior[i],
+                            k == 0   ? "outside"
+                            : k == 1 ? "inside"
+                                     : "on it"),
                       &s, exact, (256 * pt_gamma(1) + 8 * 0x1p-24) * exact, 0.02);
             pt_scene_free(&scene);
         }
@@ -892,7 +952,8 @@ static void odd_cameras(void)
     pt_scene scene = PT_SCENE_INIT;
     pt_stats s;
     begin_group("transport");
-    pt_add_parallelogram(&scene, v3(-1, -1, 0), v3(2, 0, 0), v3(0, 2, 0), lamp(&scene, 3)); /* shines towards +z */
+    pt_add_parallelogram(&scene, v3(-1, -1, 0), v3(2, 0, 0), v3(0, 2, 0),
+                         lamp(&scene, 3)); /* shines towards +z */
     pt_add_parallelogram(&scene, v3(-9, -9, 5), v3(0, 18, 0), v3(18, 0, 0), wall(&scene, 0));
     commit(&scene);
     s = radiance_along(&scene, v3(0, 0, -4), v3(0, 0, 1), many(1000, 100), 790);
@@ -933,7 +994,8 @@ static void long_sums(void)
     begin_group("transport");
     for (i = 0; i < n; i++) pt_stats_add(&s, x);
     told_relative("values 0.1f, one after the other", "mean", s.mean, x, 1e-12);
-    told_error("values 0.1f, one after the other", "variance", pt_stats_variance(&s), 0, pt_stats_variance(&s), "abs", 1e-24);
+    told_error("values 0.1f, one after the other", "variance", pt_stats_variance(&s), 0,
+               pt_stats_variance(&s), "abs", 1e-24);
 }
 
 /* The sums of a film: samples one by one in double, 2 n u at the very most, whatever the passes. */
@@ -953,8 +1015,8 @@ static void film_sums(void)
     desc.sampler = PT_SAMPLER_INDEPENDENT;
     if (pt_render(&scene, &desc, &film, NULL) != PT_OK) STRESS.nan++;
     STRESS.nan += (long)film.nonfinite;
-    told_relative(label("film of 1 pixel, %lu samples", (unsigned long)n), "pixel", pt_film_pixel(&film, 0, 0).r,
-                  (double)real(0.1), n * 0x1p-53);
+    told_relative(label("film of 1 pixel, %lu samples", (unsigned long)n), "pixel",
+                  pt_film_pixel(&film, 0, 0).r, (double)real(0.1), n * 0x1p-53);
     pt_film_free(&film);
     pt_scene_free(&scene);
 }
@@ -962,22 +1024,32 @@ static void film_sums(void)
 /* ---- random numbers ---------------------------------------------------------------------------------------- */
 
 enum { NEXT_STREAM, NEXT_SEED, SEED_FOR_STREAM, NEXT_SAMPLE, NEXT_DIMENSION, FAR_DIMENSION, NEIGHBOURS };
-static const char *const NEIGHBOUR_NAMES[NEIGHBOURS] = {"streams t, t + 1", "seeds s, s + 1", "stream t + 1, seed s + 1", "samples i, i + 1",
-                                                        "dimensions d, d + 1", "dimensions d, d + 64"};
+static const char *const NEIGHBOUR_NAMES[NEIGHBOURS] = {"streams t, t + 1",         "seeds s, s + 1",
+                                                        "stream t + 1, seed s + 1", "samples i, i + 1",
+                                                        "dimensions d, d + 1",      "dimensions d, d + 64"};
 
 /* Number i of a family and its neighbour: sampler kind, what is next to what. */
 static void neighbours(pt_sampler_kind kind, int which, uint32_t i, double u[2])
 {
     const uint64_t seed = which == NEXT_SEED || which == SEED_FOR_STREAM ? i : 5;
-    const uint64_t stream = which == NEXT_STREAM || which == SEED_FOR_STREAM ? i : which == NEXT_SEED ? 3 : i / 64;
+    const uint64_t stream = which == NEXT_STREAM || which == SEED_FOR_STREAM ? i
+                            : which == NEXT_SEED                             ? 3
+                                                                             : i / 64;
     const uint32_t index = which == NEXT_SAMPLE ? i % 64 : 11;
     const uint32_t dimension = which >= NEXT_DIMENSION ? i % 64 : 4;
     int k;
     for (k = 0; k < 2; k++) {
         const uint64_t step = (uint64_t)k;
-        pt_sampler s = pt_sampler_make(kind, pt_test_seed(seed + (which == NEXT_SEED || which == SEED_FOR_STREAM ? step : 0)), 128);
-        pt_sampler_start(&s, stream + (which == NEXT_STREAM ? step : which == SEED_FOR_STREAM ? 1 - step : 0), index + (which == NEXT_SAMPLE ? (uint32_t)k : 0));
-        pt_sampler_seek(&s, dimension + (which == NEXT_DIMENSION ? (uint32_t)k : which == FAR_DIMENSION ? 64u * (uint32_t)k : 0));
+        pt_sampler s = pt_sampler_make(
+            kind, pt_test_seed(seed + (which == NEXT_SEED || which == SEED_FOR_STREAM ? step : 0)), 128);
+        pt_sampler_start(&s,
+                         stream + (which == NEXT_STREAM       ? step
+                                   : which == SEED_FOR_STREAM ? 1 - step
+                                                              : 0),
+                         index + (which == NEXT_SAMPLE ? (uint32_t)k : 0));
+        pt_sampler_seek(&s, dimension + (which == NEXT_DIMENSION  ? (uint32_t)k
+                                         : which == FAR_DIMENSION ? 64u * (uint32_t)k
+                                                                  : 0));
         u[k] = (double)pt_sampler_1d(&s);
     }
 }
@@ -1004,7 +1076,8 @@ static void no_correlation(void)
             for (i = 0; i < 256; i++) chi2 += (cells[i] - n / 256.0) * (cells[i] - n / 256.0) / (n / 256.0);
             told(label("%s, %s", pt_sampler_name(kinds[k]), NEIGHBOUR_NAMES[w]), "chi2, 255 df", chi2, 255,
                  pt_chi2_sf(chi2, 255) < pt_test_level() ? HUGE_VAL : 0, "rejected", 0);
-            told(label("%s, %s", pt_sampler_name(kinds[k]), NEIGHBOUR_NAMES[w]), "largest number", top, 1, !(top < 1), "below 1", 0);
+            told(label("%s, %s", pt_sampler_name(kinds[k]), NEIGHBOUR_NAMES[w]), "largest number", top, 1,
+                 !(top < 1), "below 1", 0);
         }
 }
 
@@ -1028,10 +1101,24 @@ static void never_one(void)
 
 /* ---- what is refused ------------------------------------------------------------------------------------------ */
 
-enum { BIG_RADIUS, NAN_CORNER, FAR_CORNER, ZERO_RADIUS, NO_INDEX, BIG_ALBEDO, BLACK_IOR, INFINITE_LAMP, NAN_MAP, NO_NORMAL, REFUSED };
+enum {
+    BIG_RADIUS,
+    NAN_CORNER,
+    FAR_CORNER,
+    ZERO_RADIUS,
+    NO_INDEX,
+    BIG_ALBEDO,
+    BLACK_IOR,
+    INFINITE_LAMP,
+    NAN_MAP,
+    NO_NORMAL,
+    REFUSED
+};
 static const char *const REFUSED_NAMES[REFUSED] = {
-    "sphere of radius 1e30", "corner that is NaN", "corner at 1e19", "sphere of radius 0", "index beyond the vertices",
-    "albedo 1.5", "index of refraction 0", "infinite radiance", "sky of NaN", "light without direction"};
+    "sphere of radius 1e30",  "corner that is NaN",        "corner at 1e19",
+    "sphere of radius 0",     "index beyond the vertices", "albedo 1.5",
+    "index of refraction 0",  "infinite radiance",         "sky of NaN",
+    "light without direction"};
 
 static void add_refused(pt_scene *s, int which)
 {
@@ -1042,20 +1129,41 @@ static void add_refused(pt_scene *s, int which)
     pt_material glass = pt_material_dielectric(real(-0.0));
     glass.ior = real(-1);
     switch (which) {
-    case BIG_RADIUS: pt_add_sphere(s, v[0], real(1e30), m); break;
-    case NAN_CORNER: pt_add_triangle(s, v[0], v[1], pt_v3(0, nan, 0), m); break;
-    case FAR_CORNER: pt_add_triangle(s, v[0], v[1], v3(0, 1e19, 0), m); break;
-    case ZERO_RADIUS: pt_add_sphere(s, v[0], 0, m); break;
-    case NO_INDEX: pt_add_mesh(s, v, NULL, NULL, 3, index, 1, m); break;
-    case BLACK_IOR: pt_add_material(s, glass); break;
-    case INFINITE_LAMP: lamp(s, HUGE_VAL); break;
+    case BIG_RADIUS:
+        pt_add_sphere(s, v[0], real(1e30), m);
+        break;
+    case NAN_CORNER:
+        pt_add_triangle(s, v[0], v[1], pt_v3(0, nan, 0), m);
+        break;
+    case FAR_CORNER:
+        pt_add_triangle(s, v[0], v[1], v3(0, 1e19, 0), m);
+        break;
+    case ZERO_RADIUS:
+        pt_add_sphere(s, v[0], 0, m);
+        break;
+    case NO_INDEX:
+        pt_add_mesh(s, v, NULL, NULL, 3, index, 1, m);
+        break;
+    case BLACK_IOR:
+        pt_add_material(s, glass);
+        break;
+    case INFINITE_LAMP:
+        lamp(s, HUGE_VAL);
+        break;
 #if PTI_HAS_ENVIRONMENT
-    case NAN_MAP: pt_set_environment(s, pt_rgb3(nan, 0, 0)); break;
+    case NAN_MAP:
+        pt_set_environment(s, pt_rgb3(nan, 0, 0));
+        break;
 #else
-    case NAN_MAP: pt_add_point_light(s, v[0], pt_rgb3(nan, 0, 0)); break;
+    case NAN_MAP:
+        pt_add_point_light(s, v[0], pt_rgb3(nan, 0, 0));
+        break;
 #endif
-    case NO_NORMAL: pt_add_directional_light(s, v[0], grey(1)); break;
-    default: break;
+    case NO_NORMAL:
+        pt_add_directional_light(s, v[0], grey(1));
+        break;
+    default:
+        break;
     }
 }
 
@@ -1067,8 +1175,10 @@ static void refused(void)
         pt_scene scene = PT_SCENE_INIT;
         int ok;
         add_refused(&scene, i);
-        ok = pt_commit(&scene) == PT_ERROR_SCENE && strlen(pt_scene_error(&scene)) > 10 && strchr(pt_scene_error(&scene), ' ');
-        told(label("%s: \"%s\"", REFUSED_NAMES[i], pt_scene_error(&scene)), "refused with a sentence", ok, 1, !ok, "yes", 0);
+        ok = pt_commit(&scene) == PT_ERROR_SCENE && strlen(pt_scene_error(&scene)) > 10 &&
+             strchr(pt_scene_error(&scene), ' ');
+        told(label("%s: \"%s\"", REFUSED_NAMES[i], pt_scene_error(&scene)), "refused with a sentence", ok, 1,
+             !ok, "yes", 0);
         pt_scene_free(&scene);
     }
 }
@@ -1100,9 +1210,11 @@ static void twin(void)
             for (x = 0; x < SIDE; x++) {
                 const pt_rgbd c = pt_film_pixel(&film, x, y);
                 seen(c.r + c.g + c.b);
-                block[BLOCKS * (y * BLOCKS / SIDE) + x * BLOCKS / SIDE] += pt_luminance(c.r, c.g, c.b) * BLOCKS * BLOCKS / (SIDE * SIDE);
+                block[BLOCKS * (y * BLOCKS / SIDE) + x * BLOCKS / SIDE] +=
+                    pt_luminance(c.r, c.g, c.b) * BLOCKS * BLOCKS / (SIDE * SIDE);
             }
-        for (x = 0; STRESS_LONG && x < BLOCKS * BLOCKS; x++) printf("twin|%s|%d|%.17g\n", all[k].name, x, block[x]);
+        for (x = 0; STRESS_LONG && x < BLOCKS * BLOCKS; x++)
+            printf("twin|%s|%d|%.17g\n", all[k].name, x, block[x]);
         STRESS.nan += (long)film.nonfinite;
         told(all[k].name, "rendered, nothing lost", ok, 1, !ok, "yes", 0);
         pt_film_free(&film);

@@ -16,8 +16,10 @@ static double row_exact(const pt_case *c, const char *key) { return pt_case_numb
 static void value_of_row(const pt_case *c, const char *key, double got, double bound)
 {
     const double exact = row_exact(c, key);
-    if (pt_case_has(c, "soft")) told_error(c->id, key, got, got, 0, "finite", 0);
-    else told_relative(c->id, key, got, exact, bound);
+    if (pt_case_has(c, "soft"))
+        told_error(c->id, key, got, got, 0, "finite", 0);
+    else
+        told_relative(c->id, key, got, exact, bound);
 }
 
 /* ---- decisions ----------------------------------------------------------------------------------- */
@@ -28,9 +30,12 @@ static void decision(const pt_case *c, int got, double t, double bound)
     const int want = row_exact(c, "hit") > 0;
     const double exact = want ? row_exact(c, "t") : 0;
     if (got) seen(t);
-    if (!is_must(c)) told(c->id, "hit", got, want, got && !(t > 0), "convention", 0);
-    else if (got != want) told(c->id, "hit", got, want, HUGE_VAL, "decision", 0);
-    else told(c->id, want ? "t" : "miss", want ? t : 0, exact, want ? fabs(t - exact) : 0, "abs", bound);
+    if (!is_must(c))
+        told(c->id, "hit", got, want, got && !(t > 0), "convention", 0);
+    else if (got != want)
+        told(c->id, "hit", got, want, HUGE_VAL, "decision", 0);
+    else
+        told(c->id, want ? "t" : "miss", want ? t : 0, exact, want ? fabs(t - exact) : 0, "abs", bound);
 }
 
 static void sphere_row(const pt_case *c)
@@ -77,7 +82,10 @@ static void gamma_row(const pt_case *c)
     value_of_row(c, is_float() ? "g32" : "g64", pt_gamma((int)pt_case_integer(c->inputs, "n")), 1e-14);
 }
 
-static double largest(pt_vec3 v) { return fmax(fabs((double)v.x), fmax(fabs((double)v.y), fabs((double)v.z))); }
+static double largest(pt_vec3 v)
+{
+    return fmax(fabs((double)v.x), fmax(fabs((double)v.y), fabs((double)v.z)));
+}
 
 static void frame_row(const pt_case *c)
 {
@@ -97,7 +105,8 @@ static void byte_row(const pt_case *c)
 
 static void pcg_row(const pt_case *c)
 {
-    pt_pcg32 rng = pt_pcg32_make(pt_case_integer(c->inputs, "initstate"), pt_case_integer(c->inputs, "initseq"));
+    pt_pcg32 rng =
+        pt_pcg32_make(pt_case_integer(c->inputs, "initstate"), pt_case_integer(c->inputs, "initseq"));
     const char *at = pt_case_find(c->expected, "out", '=');
     int i, wrong = rng.state != pt_case_integer(c->expected, "state");
     for (i = 0; i < 6 && at; i++) {
@@ -111,8 +120,10 @@ static void pcg_row(const pt_case *c)
 static void advance_row(const pt_case *c)
 {
     const char *const text = pt_case_find(c->inputs, "delta", '=');
-    const uint64_t size = strtoull(text + (text[0] == '-'), NULL, 0), delta = text[0] == '-' ? 0 - size : size;
-    pt_pcg32 rng = pt_pcg32_make(pt_case_integer(c->inputs, "initstate"), pt_case_integer(c->inputs, "initseq"));
+    const uint64_t size = strtoull(text + (text[0] == '-'), NULL, 0),
+                   delta = text[0] == '-' ? 0 - size : size;
+    pt_pcg32 rng =
+        pt_pcg32_make(pt_case_integer(c->inputs, "initstate"), pt_case_integer(c->inputs, "initseq"));
     int wrong;
     pt_pcg32_advance(&rng, delta);
     wrong = rng.state != pt_case_integer(c->expected, "state");
@@ -123,7 +134,8 @@ static void advance_row(const pt_case *c)
 static void unit_row(const pt_case *c)
 {
     const uint32_t bits = (uint32_t)pt_case_integer(c->inputs, "u32");
-    const double got = (double)pt_real_from_u32(bits), exact = is_float() ? row_exact(c, "shift24") : bits * 0x1p-32;
+    const double got = (double)pt_real_from_u32(bits),
+                 exact = is_float() ? row_exact(c, "shift24") : bits * 0x1p-32;
     told_error(c->id, "u", got, exact, got < 1 ? fabs(got - exact) : HUGE_VAL, "abs", 0);
 }
 
@@ -132,8 +144,10 @@ static void sobol_row(const pt_case *c)
     const int d = (int)pt_case_integer(c->inputs, "dim");
     const double got = d > 4 ? 0 : pt_sobol_u32((uint32_t)pt_case_integer(c->inputs, "index"), d - 1);
     const double exact = row_exact(c, "u32");
-    if (d > 4) told(c->id, "only four dimensions, padded", 0, 0, 0, "not used", 0);
-    else told(c->id, "u32", got, exact, fabs(got - exact), "bits", 0);
+    if (d > 4)
+        told(c->id, "only four dimensions, padded", 0, 0, 0, "not used", 0);
+    else
+        told(c->id, "u32", got, exact, fabs(got - exact), "bits", 0);
 }
 
 static void owen_row(const pt_case *c)
@@ -147,7 +161,8 @@ static void variance_row(const pt_case *c)
 {
     pt_stats s = PT_STATS_INIT;
     uint64_t i;
-    for (i = 0; i < pt_case_integer(c->inputs, "n"); i++) pt_stats_add(&s, row_number(c, "base") + (double)(i & 1));
+    for (i = 0; i < pt_case_integer(c->inputs, "n"); i++)
+        pt_stats_add(&s, row_number(c, "base") + (double)(i & 1));
     value_of_row(c, "sample_var", pt_stats_variance(&s), pt_case_tolerance(c, 1, "rel"));
 }
 
@@ -171,7 +186,8 @@ static void mis_row(const pt_case *c)
 
 static void cone_row(const pt_case *c)
 {
-    value_of_row(c, "omega", pt_solid_angle_cap(row_number(c, "halfangle_rad")), pt_case_tolerance(c, 1, "rel"));
+    value_of_row(c, "omega", pt_solid_angle_cap(row_number(c, "halfangle_rad")),
+                 pt_case_tolerance(c, 1, "rel"));
 }
 
 static void triangle_omega_row(const pt_case *c)
@@ -194,7 +210,8 @@ static void rectangle_irradiance_row(const pt_case *c)
 {
     const double a = row_number(c, "a"), b = row_number(c, "b"), h = row_number(c, "h");
     const pt_vec3 v[4] = {v3(0, 0, h), v3(a, 0, h), v3(a, b, h), v3(0, b, h)};
-    value_of_row(c, "E_L1", pt_irradiance_polygon(1, v3(0, 0, 0), v3(0, 0, 1), v, 4), pt_case_tolerance(c, 1, "rel"));
+    value_of_row(c, "E_L1", pt_irradiance_polygon(1, v3(0, 0, 0), v3(0, 0, 1), v, 4),
+                 pt_case_tolerance(c, 1, "rel"));
 }
 
 static void parallel_row(const pt_case *c)
@@ -206,7 +223,8 @@ static void parallel_row(const pt_case *c)
 /* The rows name the common edge a, then the two widths. */
 static void perpendicular_row(const pt_case *c)
 {
-    value_of_row(c, "F", pt_form_factor_perpendicular(row_number(c, "b"), row_number(c, "c"), row_number(c, "a")),
+    value_of_row(c, "F",
+                 pt_form_factor_perpendicular(row_number(c, "b"), row_number(c, "c"), row_number(c, "a")),
                  pt_case_tolerance(c, 1, "rel"));
 }
 
@@ -219,8 +237,10 @@ static void sphere_light_row(const pt_case *c)
     pt_add_sphere(&scene, v3(0, 0, row_number(c, "dist")), real(row_number(c, "r")), lamp(&scene, 1));
     ok = pt_commit(&scene) == PT_OK &&
          pt_light_sample(&scene, 0, v3(0, 0, 0), pt_v2(real(row_number(c, "u")), real(0.125)), &s);
-    if (ok) value_of_row(c, "omega", 1 / s.pdf_w, rel);
-    else told(c->id, "sampled", 0, 1, !pt_case_has(c, "soft"), "decision", 0);
+    if (ok)
+        value_of_row(c, "omega", 1 / s.pdf_w, rel);
+    else
+        told(c->id, "sampled", 0, 1, !pt_case_has(c, "soft"), "decision", 0);
     pt_scene_free(&scene);
 }
 
@@ -231,8 +251,10 @@ static void fresnel_row(const pt_case *c)
     double cos_t;
     const double got = pt_fresnel_dielectric(row_number(c, "cosi"), row_number(c, "eta"), &cos_t);
     const double exact = row_exact(c, "R");
-    if (pt_case_has(c, "soft")) told_error(c->id, "R", got, got, !(got >= 0 && got <= 1), "in [0,1]", 0);
-    else told_error(c->id, "R", got, exact, fabs(got - exact), "abs", pt_case_tolerance(c, 1, "abs"));
+    if (pt_case_has(c, "soft"))
+        told_error(c->id, "R", got, got, !(got >= 0 && got <= 1), "in [0,1]", 0);
+    else
+        told_error(c->id, "R", got, exact, fabs(got - exact), "abs", pt_case_tolerance(c, 1, "abs"));
 }
 
 #if PTI_HAS_MICROFACET
@@ -256,7 +278,8 @@ static void ggx_row(const pt_case *c)
         told(c->id, "isotropic reflection only", 0, 0, 0, "not used", 0);
         return;
     }
-    value_of_row(c, "D", pt_ggx_d(h, alpha), fmax(ggx_bound(alpha), pt_case_tolerance(c, !is_float(), "rel")));
+    value_of_row(c, "D", pt_ggx_d(h, alpha),
+                 fmax(ggx_bound(alpha), pt_case_tolerance(c, !is_float(), "rel")));
     value_of_row(c, "G1o", pt_ggx_g1(wo, alpha), 16 * pt_gamma(1));
     value_of_row(c, "G1i", pt_ggx_g1(wi, alpha), 16 * pt_gamma(1));
 }
@@ -266,11 +289,13 @@ static void visible_row(const pt_case *c)
 {
     const double alpha = row_number(c, "ax");
     const pt_vec3 wo = pt_case_vec3(c->inputs, "wo");
-    const pt_vec2 u = pt_v2(real(fmin(row_number(c, "u1"), 1 - pt_gamma(1))), real(fmin(row_number(c, "u2"), 1 - pt_gamma(1))));
+    const pt_vec2 u = pt_v2(real(fmin(row_number(c, "u1"), 1 - pt_gamma(1))),
+                            real(fmin(row_number(c, "u2"), 1 - pt_gamma(1))));
     const pt_vec3 h = pt_ggx_visible_sample(wo, alpha, u);
     const double length = fabs(sqrt(dot(h, h)) - 1);
     seen(dot(h, h));
-    told(c->id, "unit, above, seen", length, 0, (double)h.z >= 0 && dot(h, wo) > -8 * pt_gamma(1) ? length : HUGE_VAL, "abs", 4 * pt_gamma(1));
+    told(c->id, "unit, above, seen", length, 0,
+         (double)h.z >= 0 && dot(h, wo) > -8 * pt_gamma(1) ? length : HUGE_VAL, "abs", 4 * pt_gamma(1));
 }
 #endif
 
@@ -314,7 +339,8 @@ static void furnace_row(const pt_case *c)
 {
     const int bounces = (int)pt_case_integer(c->inputs, "maxdepth");
     const double u = pt_gamma(bounces < 1000 ? 4 * bounces + 4 : 4000);
-    const pt_stats s = furnace_paths(row_number(c, "rho"), 0, bounces + 1, bounces > 1000 && !STRESS_LONG ? 1 : 8, 700);
+    const pt_stats s =
+        furnace_paths(row_number(c, "rho"), 0, bounces + 1, bounces > 1000 && !STRESS_LONG ? 1 : 8, 700);
     told_relative(c->id, "Ltrunc", s.mean, row_exact(c, "Ltrunc"), u);
 }
 
@@ -324,8 +350,10 @@ static void roulette_row(const pt_case *c)
     const double rho = row_number(c, "rho"), q = row_number(c, "q");
     const int n = (int)fmax(32, (STRESS_LONG ? 1e7 : 1e6) / row_exact(c, "mean_len"));
     const pt_stats s = furnace_paths(rho, q, 0, (int)fmin(n, STRESS_LONG ? 4e6 : 4e4), 710);
-    if (q * q > rho * rho * rho && n >= 1024) told_mean(c->id, &s, row_exact(c, "mean"), 0, 0);
-    else told_error(c->id, "finite", s.mean, s.mean, 0, "finite", 0);
+    if (q * q > rho * rho * rho && n >= 1024)
+        told_mean(c->id, &s, row_exact(c, "mean"), 0, 0);
+    else
+        told_error(c->id, "finite", s.mean, s.mean, 0, "finite", 0);
 }
 
 /* ---- files ---------------------------------------------------------------------------------------- */
@@ -358,7 +386,8 @@ static void pfm_row(const pt_case *c)
             const float v = value[(h - 1 - i / w) * w + i % w];
             uint32_t bits;
             memcpy(&bits, &v, sizeof bits);
-            wrong += bytes[got - (size_t)(12 * w * h) + (size_t)(12 * i + k)] != ((bits >> (8 * (k % 4))) & 255u);
+            wrong +=
+                bytes[got - (size_t)(12 * w * h) + (size_t)(12 * i + k)] != ((bits >> (8 * (k % 4))) & 255u);
         }
     remove(path);
     told_count(c->id, "wrong bytes", wrong, 12 * w * h);
