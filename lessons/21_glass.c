@@ -12,7 +12,7 @@
              through the glass. No shadow ray helps: the glass is in its way. Smaller lamps: rarer, brighter
              hits. Point lamps: probability zero, a black caustic, and no noise to warn of it.
    EXACT     Endless water over a floor of albedo rho that emits Le, under a sky of radiance Ls, seen where
-             the Fresnel reflectance is F; Fo, Fi the diffuse reflectances from outside and inside (lesson 20):
+             Fresnel's reflectance is F; Fo, Fi the diffuse ones from outside and inside (lesson 20):
                  L = F Ls + (1-F)/n^2 (Le + rho (1-Fo) Ls) / (1 - rho Fi)         (.358699 for the first row)
              Sun of half angle a in the zenith, a pane that transmits T = (1-F)/(1+F) (all reflections inside
              it), a floor below: L = rho/pi Lsun pi sin^2 a T. Here Lsun = 1/sin^2 a: L = rho T for all sizes.

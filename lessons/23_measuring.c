@@ -4,7 +4,7 @@
    IDEA      A gonioreflectometer sends a thin beam along wo and counts what arrives in a sensor at wi. If
              it covers the directions S, it measures the mean of f there:
 
-                 f = (fraction of the light that arrives) / int_S cos dw,    for a cone of half angle a: pi sin^2 a
+                 f = (fraction of the light that arrives) / int_S cos dw,   a cone of half angle a: pi sin^2 a
 
              An isotropic BRDF has 3 angles: 90 x 90 x 180 = 1,458,000 cells for each colour. Which angles?
              A highlight is where the half vector h = (wo + wi)/|wo + wi| is near the normal: take theta_h and

@@ -15,12 +15,12 @@
              bands, Y is spectral, se is the standard error of each.
    PHOTO     A photograph differs still: reflectances were measured on other samples, the lamp is no uniform
              Lambertian square, the room around is not black, lens and film scatter, vignette and have a
-             response curve, and no screen shows a lamp 300 times as bright as the wall beside it.
+             response curve, and no screen shows a lamp a hundred times as bright as the wall beside it.
    BUILD     cc -O2 -I.. 24_is_it_correct.c -o 24_is_it_correct -lm -pthread
    RUN       ./24_is_it_correct [samples] [output]
    PRINTS    probe    G, ref.       mine     header    Y, ref.       mine Y of RGB  seconds
-             0        0.06564    0.06562    0.06532    0.07232    0.07277    -0.0%    0.142
-             4        0.01007    0.01010    0.01011    0.04291    0.04302   +12.1%    0.133
+             0        0.06564    0.06571    0.06532    0.07232    0.07202    -0.0%    0.115
+             4        0.01007    0.01010    0.01015    0.04291    0.04244   +12.1%    0.095
    WORDS     Cornell box 康奈尔盒, ground truth 真值(参考图), spectrum 光谱, wavelength 波长, unbiased 无偏,
              color matching function 颜色匹配函数
    HEADER    [PT-05] pt_cie_xyz, pt_xyz_to_rgb, [PT-11] pt_li_path, [PT-19] pt_scene_cornell,
