@@ -7,7 +7,7 @@
                  P(s | S) = area(s) / area(S)                    (Cauchy, Crofton: all lines equally likely)
 
              so a line enters, on average, sum over nodes of area(node) / area(S) boxes of a tree. The surface
-             area heuristic (SAH) builds a tree that keeps the sum small; it grows about as log n, not as n.
+             area heuristic (SAH) keeps this sum and the tests in leaves small; they grow as log n, not as n.
              A line is between two planes for t0 <= t <= t1; it enters the box if the latest entry is <= the
              earliest exit. It must be <=: a wall parallel to an axis has a box without thickness, t0 = t1.
    EXACT     The sums of areas above, for one flat box and for whole trees, in a cube of edge 6.
@@ -325,5 +325,5 @@ int main(int argc, char **argv)
       the floor is missed. -DEX=3: the first hit found ends the search; only the comparison of hits can
       tell.
    3. Extend it: of all splits of a node's sorted middles take the one with the smallest area(left)
-      count(left) + area(right) count(right). The sum of areas for 130 triangles should come down from 13.1
-      towards 7.3. */
+      count(left) + area(right) count(right). Boxes and tests at 32770 triangles should come down from 19.1
+      a ray towards the 8.3 of the header's tree. */

@@ -9,7 +9,7 @@
 
              From the dense side there is no t2 beyond the critical angle asin(n2/n1): all light is reflected.
              R_p = 0 at Brewster's angle atan(n2/n1). Schlick: R0 + (1 - R0) (1 - cos t)^5.
-   EXACT     The mean over diffuse (cosine-distributed) light, 2 int R(c) c dc, has Walsh's closed form, below.
+   EXACT     The mean over diffuse (cosine-distributed) light, 2 int R(c) c dc, has Walsh's closed form.
              From inside it follows by reciprocity: the same beams pass, n^2 times narrower inside, so
              1 - F_inside = (1 - F_outside) / n^2.
    SLIDES    "The brightness of shadows varies": reflections are meant. Schlick as written there fails for
@@ -122,7 +122,8 @@ static void angles(void)
     my_fresnel(cos(brewster), 1, glass, &rs, &rp);
     check(rp < 1e-20, "R_p = 0 at Brewster's angle");
     r = my_fresnel(cos(critical + 1e-6), glass, 1, &rs, &rp);
-    check(r == 1 && my_fresnel(cos(critical - 1e-6), glass, 1, &rs, &rp) < 1, "total reflection from asin(1/n)");
+    check(r == 1 && my_fresnel(cos(critical - 1e-6), glass, 1, &rs, &rp) < 1,
+          "total reflection begins at asin(1/n)");
     printf("       Brewster %.2f degrees, critical %.2f degrees\n", brewster / degree, critical / degree);
     r = my_fresnel(0.5, 1, glass, &rs, &rp);
     if (EX != 1) check(fabs(r - 0.0892) < 5e-5, "60 degrees, n = 1.5: R = .0892 (Schlick .0700)");
@@ -151,7 +152,8 @@ static int estimate(int inside, int header, int n)
         for (k = 0; k < 3; k++) u[k] = pt_pcg32_double(&rng);
         wo = pt_warp_cosine(pt_v2((pt_real)u[0], (pt_real)u[1]));
         if (!header) pt_stats_add(&s, my_fresnel((double)wo.z, n1, n2, &rs, &rp));
-        else if (pt_bsdf_sample(&bsdf, wo, u[2], pt_v2(0, 0), PT_RADIANCE, &out)) pt_stats_add(&s, out.wi.z > 0);
+        else if (pt_bsdf_sample(&bsdf, wo, u[2], pt_v2(0, 0), PT_RADIANCE, &out))
+            pt_stats_add(&s, out.wi.z > 0);
     }
     row(name[2 * inside + header], &s, exact, pt_cpu_seconds() - start);
     return fabs(s.mean - exact) <= 5 * pt_stats_standard_error(&s);
@@ -236,7 +238,7 @@ int main(int argc, char **argv)
            "seconds");
     for (k = 0; k < 4; k++)
         for (i = n / 256; i <= n; i *= 16) agree = estimate(k / 2, k % 2, i) && agree;
-    printf("See: more than half of the diffuse light inside glass is kept in; a coin for each ray has more noise.\n");
+    printf("See: more than half of the diffuse light inside is kept in; coins have more noise.\n");
     check(agree, "means within 5 standard errors of Walsh's formula");
     check(fabs(walsh(glass) - pt_fresnel_diffuse(glass)) < 1e-12, "pt_fresnel_diffuse is Walsh's formula");
     check(picture(output), "picture and plot written");

@@ -6,14 +6,14 @@
 
                  n1 sin t1 = n2 sin t2   =>   n1^2 cos t1 dw1 = n2^2 cos t2 dw2   =>   L1 / n1^2 = L2 / n2^2
 
-             A path from the eye into glass therefore carries the weight 1/n^2, out of it n^2. They cancel for a
-             path that leaves again: a missing n^2 is invisible until a lamp is inside.
+             A path from the eye carries the weight 1/n^2 into glass, n^2 out of it. They cancel for a path
+             that leaves again: a missing n^2 is invisible until a lamp is inside.
              Caustics LS+DE: a path from the eye finds them when its diffuse bounce happens to hit the lamp
              through the glass. No shadow ray helps: the glass is in its way. Smaller lamps: rarer, brighter
              hits. Point lamps: probability zero, a black caustic, and no noise to warn of it.
-   EXACT     Endless water over a floor of albedo rho that emits Le, under a sky of radiance Ls, seen where the
-             Fresnel reflectance is F; Fo, Fi the diffuse reflectances from outside and inside (lesson 20):
-                 L = F Ls + (1-F)/n^2 (Le + rho (1-Fo) Ls) / (1 - rho Fi)            (.358699 for the first row)
+   EXACT     Endless water over a floor of albedo rho that emits Le, under a sky of radiance Ls, seen where
+             Fresnel's reflectance is F; Fo, Fi the diffuse ones from outside and inside (lesson 20):
+                 L = F Ls + (1-F)/n^2 (Le + rho (1-Fo) Ls) / (1 - rho Fi)         (.358699 for the first row)
              Sun of half angle a in the zenith, a pane that transmits T = (1-F)/(1+F) (all reflections inside
              it), a floor below: L = rho/pi Lsun pi sin^2 a T. Here Lsun = 1/sin^2 a: L = rho T for all sizes.
    BUILD     cc -O2 -I.. 21_glass.c -o 21_glass -lm -pthread
@@ -64,8 +64,8 @@ static const my_water waters[3] = {
 
 /* --- mine --- */
 
-/* Glass met at cosine *c; eta = index beyond over index before. 0: reflected; 1: refracted, with *c the cosine
-   beyond, and *beta multiplied. EX 2, 3 and 4 are WRONG: no n^2; its inverse; from inside as from outside. */
+/* Glass met at cosine *c; eta = index beyond over index before. 0: reflected; 1: refracted, *c is the cosine
+   beyond and *beta multiplied. EX 2, 3 and 4 are WRONG: no n^2; its inverse; from inside as from outside. */
 static int my_glass(double *c, double eta, pt_pcg32 *rng, double *beta)
 {
     double c2, r = pt_fresnel_dielectric(*c, EX == 4 && eta < 1 ? 1 / eta : eta, &c2);
@@ -238,9 +238,10 @@ static int picture(const char *output, int spp)
         pt_scene s = PT_SCENE_INIT;
         pt_film film = PT_FILM_INIT;
         pt_render_desc desc = pt_render_defaults();
+        int glass = pt_add_material(&s, pt_material_dielectric((pt_real)1.5));
         int lamp = pt_add_material(&s, pt_material_emitter(pt_rgb_grey((pt_real)(16 / (r * r)))));
         flat(&s, 8, 0, pt_add_material(&s, pt_material_diffuse(pt_rgb_grey((pt_real)0.5))));
-        pt_add_sphere(&s, v3(0, 0.9, 0), (pt_real)0.8, pt_add_material(&s, pt_material_dielectric((pt_real)1.5)));
+        pt_add_sphere(&s, v3(0, 0.9, 0), (pt_real)0.8, glass);
         pt_add_sphere(&s, v3(2.5, 5, 0), (pt_real)r, lamp);
         desc.camera = pt_camera_look_at(v3(0, 3, 5), v3(-0.4, 0.4, 0), v3(0, 1, 0), 40);
         desc.width = W;
@@ -268,7 +269,7 @@ int main(int argc, char **argv)
     printf("%-14s %9s %12s %12s %10s %8s\n", "", "samples", "estimate", "exact", "std error", "seconds");
     pools(n);
     caustics(n);
-    printf("See: the smaller the sun, the noisier its caustic; the point light has no noise and no caustic.\n");
+    printf("See: the smaller the sun, the noisier its caustic; a point light has none, without noise.\n");
     check(picture(output, 24), "picture written");
     printf("lesson 21: %d passed, %d failed\n", passed, failed);
     if (!MISTAKE) return failed != 0;

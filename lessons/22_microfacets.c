@@ -1,12 +1,12 @@
 /* Lesson 22: Microfacets: D, F, G, and visible normals
 
-   QUESTION  Frosted metal is made of tiny mirrors. What BRDF has such a surface, how is it sampled, and does it
-             reflect all light?
+   QUESTION  Frosted metal is made of tiny mirrors. What BRDF has such a surface, how is it sampled, and
+             does it reflect all light?
    IDEA      A facet with normal h sends wo into wi only if h is half way, h = (wo + wi)/|wo + wi|. With the
              density D of normals (GGX, roughness alpha), Fresnel's F and the visible fraction G:
 
                  f = F(wo,h) G(wo,wi) D(h) / (4 (n.wo) (n.wi)),       int D(h) (n.h) dh = 1
-                 D = alpha^2 / (pi ((n.h)^2 (alpha^2 - 1) + 1)^2),    density of wi = density of h / (4 (wo.h))
+                 D = alpha^2 / (pi ((n.h)^2 (alpha^2 - 1) + 1)^2),   density of wi = density of h / (4 (wo.h))
                  G1 = 1/(1+L),  L = (sqrt(1 + alpha^2 tan^2) - 1) / 2,  G = 1/(1 + L(wo) + L(wi))
 
              Draw h from D (n.h), or better from the facets that wo sees, D G1 (wo.h)/(n.wo): then the weight
@@ -101,7 +101,7 @@ static my_vec my_normal(double alpha, double u, double v)
     return unit(r * cos(2 * PT_PI * v), r * sin(2 * PT_PI * v), 1);
 }
 
-/* A normal that o sees. Stretched by alpha the facets are a hemisphere; what o sees of it mirrors into a cap. */
+/* A normal that o sees. Stretched by alpha the facets are a hemisphere; its seen part mirrors into a cap. */
 static my_vec my_visible(my_vec o, double alpha, double u, double v)
 {
     my_vec s = unit(alpha * o.x, alpha * o.y, o.z);
@@ -184,7 +184,7 @@ static void compare(const my_case *c, int n)
         ok = ok && fabs(s[k].mean - (k == HEADER ? c->exact : exact)) <= 5 * pt_stats_standard_error(&s[k]);
     check(ok, "within 5 standard errors of the exact value");
     check(most[VISIBLE] <= 1 + 1e-9 && most[HEADER] <= 1 + 1e-6, "visible normals: no weight above 1");
-    printf("       largest weight %.4g with D cos, %.4g with visible normals\n", most[NORMALS], most[VISIBLE]);
+    printf("       largest weight %.4g by normals, %.4g by visible ones\n", most[NORMALS], most[VISIBLE]);
 }
 
 /* The albedo seen from above, by Simpson's rule. */
@@ -230,7 +230,8 @@ static int picture(const char *output)
     for (k = 0; k < 4; k++) {
         pt_real r = (pt_real)sqrt(alpha[k]);
         int metal = pt_add_material(&scene, pt_material_conductor(pt_rgb_grey(1), pt_rgb_grey(100000), r));
-        pt_add_sphere(&scene, pt_v3((pt_real)(k % 2 * 2 - 1), (pt_real)(1 - k / 2 * 2), 0), (pt_real)0.9, metal);
+        pt_vec3 centre = pt_v3((pt_real)(k % 2 * 2 - 1), (pt_real)(1 - k / 2 * 2), 0);
+        pt_add_sphere(&scene, centre, (pt_real)0.9, metal);
     }
     pt_set_environment(&scene, pt_rgb_grey((pt_real)0.7));
     desc.camera = pt_camera_look_at(pt_v3(0, 0, 20), pt_v3(0, 0, 0), pt_v3(0, 1, 0), (pt_real)11.5);

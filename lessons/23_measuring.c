@@ -1,10 +1,10 @@
 /* Lesson 23: Measuring a BRDF: gonioreflectometer and MERL table
 
    QUESTION  How does the BRDF of a real thing get into a renderer, and what is in such a table?
-   IDEA      A gonioreflectometer sends a thin beam along wo and counts what arrives in a sensor at wi. One that
-             covers the directions S measures the mean of f there:
+   IDEA      A gonioreflectometer sends a thin beam along wo and counts what arrives in a sensor at wi. If
+             it covers the directions S, it measures the mean of f there:
 
-                 f = (fraction of the light that arrives) / int_S cos dw,      a cone of half angle a: pi sin^2 a
+                 f = (fraction of the light that arrives) / int_S cos dw,   a cone of half angle a: pi sin^2 a
 
              An isotropic BRDF has 3 angles: 90 x 90 x 180 = 1,458,000 cells for each colour. Which angles?
              A highlight is where the half vector h = (wo + wi)/|wo + wi| is near the normal: take theta_h and
@@ -129,7 +129,7 @@ static int scatter(void *user, pt_vec3 wo, pt_pcg32 *rng, pt_vec3 *wi, pt_rgb *w
     pt_frame frame = pt_frame_from_normal(pt_v3(-wo.x, -wo.y, wo.z));
     (void)user;
     *wi = pt_frame_to_world(&frame, v3(s * cos(phi), s * sin(phi), c));
-    *weight = pt_rgb_grey((pt_real)(ALBEDO * (EXPONENT + 2) / (EXPONENT + 1) * (double)wi->z)); /* f cos / pdf */
+    *weight = pt_rgb_grey((pt_real)(ALBEDO * (EXPONENT + 2) / (EXPONENT + 1)) * wi->z); /* f cos / pdf */
     return wi->z > 0;
 }
 
@@ -278,7 +278,7 @@ int main(int argc, char **argv)
     error[0] = cells("MERL", MERL, n);
     error[1] = cells("theta_h linear", LINEAR, n);
     error[2] = cells("the slides'", SLIDES, n);
-    printf("See: of three tables of the same size, the one whose angles follow the highlight holds it best.\n");
+    printf("See: of three tables of one size, that whose angles follow the highlight holds it best.\n");
     check(error[0] < error[1] && error[0] < error[2], "MERL's angles hold the lobe best");
     check(round_trip(output, &table), "file in the MERL format: the same bits back");
     check(picture(output, material), "picture written");
