@@ -677,6 +677,22 @@ static int plant(pt_scene *scene, int grove, int n)
     return count;
 }
 
+/* Numbers are drawn one after the other: the order in which arguments are evaluated is the compiler's. */
+static pt_vec3 in_cube(pt_pcg32 *rng, double half)
+{
+    const double x = between(rng, -half, half), y = between(rng, -half, half), z = between(rng, -half, half);
+    return v3(x, y, z);
+}
+
+/* A point for rays to aim at: the middle of a primitive, so that some hit, or anywhere, or near the origin. */
+static pt_vec3 target(const pt_scene *scene, int i, pt_pcg32 *rng)
+{
+    pt_vec3 v[4];
+    if (i % 3 || scene->primitive_count == 0) return in_cube(rng, i % 2 ? 1 : 0.1);
+    pti_corners(scene, &scene->primitives[pt_pcg32_next(rng) % (uint32_t)scene->primitive_count], v);
+    return pt_v3_scale(pt_v3_add(pt_v3_add(v[0], v[1]), v[2]), (pt_real)(1.0 / 3));
+}
+
 /* Rays that find another hit than a linear search; the scene without its tree is one. */
 static int other_hits(const pt_scene *scene, int rays, int *hits)
 {
@@ -685,9 +701,7 @@ static int other_hits(const pt_scene *scene, int rays, int *hits)
     int i, other = 0;
     flat.bvh.node_count = 0;
     for (i = *hits = 0; i < rays; i++) {
-        const double aim = pt_pcg32_double(&rng) < 0.5 ? 1 : 0.1;
-        const pt_vec3 from = v3(between(&rng, -2, 2), between(&rng, -2, 2), between(&rng, -2, 2));
-        const pt_vec3 to = v3(between(&rng, -aim, aim), between(&rng, -aim, aim), between(&rng, -aim, aim));
+        const pt_vec3 from = in_cube(&rng, 2), to = target(scene, i, &rng);
         const pt_ray ray = ray_from(from, i % 7 ? pt_v3_sub(to, from) : v3(i % 3 - 1, i / 3 % 3 - 1, 1));
         pt_hit a, b;
         const int in_tree = pt_intersect(scene, &ray, &a), in_list = pt_intersect(&flat, &ray, &b);

@@ -966,7 +966,9 @@ static void tree_splits(void)
     int i, flat, wrong;
     for (flat = 0; flat < 4; flat++) { /* boxes with sides, or without one along the axis flat - 1 */
         for (i = 0; i < SPLIT_MOST; i++) {
-            const vec c = random_vec(&rng, flat == 1 ? 100 : 10), d = vec3(uniform(&rng, 0, 3), uniform(&rng, 0, 2), uniform(&rng, 0, 1));
+            const vec c = random_vec(&rng, flat == 1 ? 100 : 10);
+            const double x = uniform(&rng, 0, 3), y = uniform(&rng, 0, 2), z = uniform(&rng, 0, 1);
+            const vec d = vec3(x, y, z);
             lo[i] = real3(vec3(flat == 1 ? 0 : c.x, flat == 2 ? 0 : c.y, flat == 3 ? 0 : c.z));
             hi[i] = pt_v3_add(lo[i], real3(vec3(flat == 1 ? 0 : d.x, flat == 2 ? 0 : d.y, flat == 3 ? 0 : d.z)));
         }

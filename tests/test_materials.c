@@ -922,10 +922,11 @@ static void lobe_masks(void)
             const pt_rgb d = pt_bsdf_eval(&b, o, w, PT_RADIANCE, PT_LOBE_DIFFUSE), g = pt_bsdf_eval(&b, o, w, PT_RADIANCE, PT_LOBE_GLOSSY);
             const pt_rgb all = pt_bsdf_eval(&b, o, w, PT_RADIANCE, PT_LOBE_ALL), delta = pt_bsdf_eval(&b, o, w, PT_RADIANCE, PT_LOBE_SPECULAR);
             const pt_rgb none = pt_bsdf_eval(&b, o, w, PT_RADIANCE, 0);
+            const double u = pt_pcg32_double(&rng);
             pt_bsdf_sample_result s;
             wrong += !(d.r + g.r == all.r && d.g + g.g == all.g && d.b + g.b == all.b && delta.g == 0 && none.g == 0);
             wrong += (!(lobes[k] & PT_LOBE_DIFFUSE) && d.g > 0) || (!(lobes[k] & PT_LOBE_GLOSSY) && g.g > 0);
-            if (pt_bsdf_sample(&b, o, pt_pcg32_double(&rng), pair(&rng), PT_RADIANCE, &s)) drawn_lobes |= (int)s.lobe;
+            if (pt_bsdf_sample(&b, o, u, pair(&rng), PT_RADIANCE, &s)) drawn_lobes |= (int)s.lobe;
         }
         pt_check(wrong == 0 && b.lobes == lobes[k] && (unsigned)drawn_lobes == lobes[k], material_names[k],
                  "%d masks are wrong; has lobes %u, draws %d", wrong, b.lobes, drawn_lobes);
