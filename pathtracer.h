@@ -178,6 +178,10 @@
     !defined(PT_ALLOW_FAST_MATH)
 #error "pathtracer.h: -ffast-math and its kin remove the checks for NaN and the guarantees of [PT-06]; see PT_ALLOW_FAST_MATH"
 #endif
+#if ((defined(__FLT_EVAL_METHOD__) && (__FLT_EVAL_METHOD__ < 0 || __FLT_EVAL_METHOD__ > 1)) || \
+     (defined(_M_IX86_FP) && _M_IX86_FP < 2)) && !defined(PT_ALLOW_FAST_MATH)
+#error "pathtracer.h: x87 arithmetic rounds twice, and when it does is the compiler's; -msse2 -mfpmath=sse (/arch:SSE2) does not"
+#endif
 
 /* The switches, normalised once: below this table only PTI_HAS_X is asked. */
 #ifdef PT_ONLY_PATH
