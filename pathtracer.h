@@ -3591,46 +3591,50 @@ PTDEF double pt_gamma(int n)
     return n * PTI_UNIT_ROUNDOFF / (1 - n * PTI_UNIT_ROUNDOFF);
 }
 
-/* A ray made ready for the shapes and boxes. */
+/* A ray made ready for the shapes. */
 typedef struct pti_ray {
     double o[3], d[3];
     int kx, ky, kz;         /* the axes, z the longest of d                                                */
     double sx, sy, sz;      /* shear and scale that take d to (0,0,1)                                      */
     double end;             /* tmax: what may lie at it, or beyond it by rounding, is not hit              */
-    pt_real origin[3], inverse[3]; /* for boxes: o and 1/d, rounded; 1/0 = infinity                        */
 } pti_ray;
 
 /* From an origin and a direction in double. Paths carry the origin with the digits that pt_real loses: far from the
    coordinate origin a rounded hit point would lie behind the neighbouring wall of an edge. */
+PTI_INLINE void pti_ray_set(pti_ray *r, pti_d3 o, pti_d3 d, double end)
+{
+    static const signed char x_of[6] = {1, 2, 0, 2, 0, 1}, y_of[6] = {2, 0, 1, 1, 2, 0};
+    const double x = fabs(d.x), y = fabs(d.y), z = fabs(d.z);
+    int k;
+    r->end = end;
+    r->o[0] = o.x; r->o[1] = o.y; r->o[2] = o.z;
+    r->d[0] = d.x; r->d[1] = d.y; r->d[2] = d.z;
+    r->kz = z > (x > y ? x : y) ? 2 : !(x > y);
+    k = r->kz + 3 * (r->d[r->kz] < 0); /* x and y exchanged keep the winding of triangles */
+    r->kx = x_of[k];
+    r->ky = y_of[k];
+    r->sz = 1 / r->d[r->kz];
+    r->sx = r->d[r->kx] * r->sz;
+    r->sy = r->d[r->ky] * r->sz;
+}
+
 static pti_ray pti_ray_from(pti_d3 o, pti_d3 d, double end)
 {
     pti_ray r;
-    int k;
-    r.end = end;
-    r.o[0] = o.x; r.o[1] = o.y; r.o[2] = o.z;
-    r.d[0] = d.x; r.d[1] = d.y; r.d[2] = d.z;
-    for (k = 0; k < 3; k++) {
-        r.origin[k] = (pt_real)r.o[k];
-        r.inverse[k] = 1 / (pt_real)r.d[k];
-    }
-    r.kz = fabs(r.d[0]) > fabs(r.d[1]) ? 0 : 1;
-    if (fabs(r.d[2]) > fabs(r.d[r.kz])) r.kz = 2;
-    r.kx = r.kz == 2 ? 0 : r.kz + 1;
-    r.ky = r.kx == 2 ? 0 : r.kx + 1;
-    if (r.d[r.kz] < 0) { /* keeps the winding of triangles */
-        k = r.kx;
-        r.kx = r.ky;
-        r.ky = k;
-    }
-    r.sz = 1 / r.d[r.kz];
-    r.sx = r.d[r.kx] * r.sz;
-    r.sy = r.d[r.ky] * r.sz;
+    pti_ray_set(&r, o, d, end);
     return r;
+}
+
+PTI_INLINE void pti_ray_set_real(pti_ray *r, const pt_ray *ray)
+{
+    pti_ray_set(r, pti_d_from(ray->o), pti_d_from(ray->d), ray->tmax >= PTI_REAL_MAX ? HUGE_VAL : (double)ray->tmax); /* NaN stays */
 }
 
 static pti_ray pti_ray_make(const pt_ray *ray)
 {
-    return pti_ray_from(pti_d_from(ray->o), pti_d_from(ray->d), ray->tmax >= PTI_REAL_MAX ? HUGE_VAL : (double)ray->tmax); /* NaN stays */
+    pti_ray r;
+    pti_ray_set_real(&r, ray);
+    return r;
 }
 
 /* a * b - c * d with the exact sign; swapping the two products negates the result exactly. */
@@ -3653,25 +3657,34 @@ PTI_INLINE pti_d3 pti_shear(const pti_ray *r, pt_vec3 v)
     return pti_d(c[r->kx] - px, c[r->ky] - py, r->sz * c[r->kz]);
 }
 
+/* The largest of three magnitudes. */
+PTI_INLINE double pti_max3(double a, double b, double c)
+{
+    a = fabs(a);
+    b = fabs(b);
+    c = fabs(c);
+    if (b > a) a = b;
+    return c > a ? c : a;
+}
+
 /* Bound of the rounding error of the depth u a.z + v b.z + w c.z before it is divided by det ([PBR] 6.8.7): an
    origin on the plane of the triangle may come out in front of it by no more than this. Relative errors, in
    units of e = 2^-53: z 3 (difference, reciprocal, product), x and y 5 of their own and the sheared-off part,
    an edge function 2 and what x and y bring in, the sum 3. */
-static double pti_depth_error(const pti_ray *r, pti_d3 a, pti_d3 b, pti_d3 c, double u, double v, double w)
+PTI_INLINE double pti_depth_error(const pti_ray *r, pti_d3 a, pti_d3 b, pti_d3 c, double u, double v, double w)
 {
     const double e = PTI_2_M53 * (1 + 16 * PTI_2_M53);
-    double x = fmax(fabs(a.x), fmax(fabs(b.x), fabs(c.x))), y = fmax(fabs(a.y), fmax(fabs(b.y), fabs(c.y)));
-    double z = fmax(fabs(a.z), fmax(fabs(b.z), fabs(c.z))), sheared = z / fabs(r->sz);
+    double x = pti_max3(a.x, b.x, c.x), y = pti_max3(a.y, b.y, c.y), z = pti_max3(a.z, b.z, c.z);
+    double sheared = z * fabs(r->d[r->kz]), edge = pti_max3(u, v, w);
     double dx = 5 * e * (x + sheared), dy = 5 * e * (y + sheared), dz = 3 * e * z;
-    double edge = fmax(fabs(u), fmax(fabs(v), fabs(w))), dedge = 2 * (2 * e * x * y + dy * x + dx * y);
+    double dedge = 2 * (2 * e * x * y + dy * x + dx * y);
     return 3 * (3 * e * edge * z + dedge * z + dz * edge);
 }
 
-/* t in (0, tmax) and weights of corners b and c. */
-PTI_INLINE int pti_triangle(const pti_ray *r, pt_vec3 v0, pt_vec3 v1, pt_vec3 v2, double tmax, double *t,
-                            double *b1, double *b2)
+/* Of the sheared corners a, b, c: t in (0, tmax) and weights of b and c. */
+PTI_INLINE int pti_sheared_triangle(const pti_ray *r, pti_d3 a, pti_d3 b, pti_d3 c, double tmax, double *t, double *b1,
+                                    double *b2)
 {
-    pti_d3 a = pti_shear(r, v0), b = pti_shear(r, v1), c = pti_shear(r, v2);
     double u = pti_edge(c.x, b.y, c.y, b.x), v = pti_edge(a.x, c.y, a.y, c.x), w, det, depth, p, q, error;
     if ((u < 0 && v > 0) || (u > 0 && v < 0)) return 0;
     w = pti_edge(b.x, a.y, b.y, a.x);
@@ -3693,6 +3706,12 @@ PTI_INLINE int pti_triangle(const pti_ray *r, pt_vec3 v0, pt_vec3 v1, pt_vec3 v2
     *b1 = v / det;
     *b2 = w / det;
     return 1;
+}
+
+PTI_INLINE int pti_triangle(const pti_ray *r, pt_vec3 v0, pt_vec3 v1, pt_vec3 v2, double tmax, double *t,
+                            double *b1, double *b2)
+{
+    return pti_sheared_triangle(r, pti_shear(r, v0), pti_shear(r, v1), pti_shear(r, v2), tmax, t, b1, b2);
 }
 
 /* The corners in order, rounded to pt_real as a user's own sums would be: then a neighbour with the same
@@ -3772,11 +3791,27 @@ PTDEF int pt_intersect_triangle(const pt_ray *ray, pt_vec3 v0, pt_vec3 v1, pt_ve
     return pti_triangle_has_area(v0, v1, v2) && pti_triangle(&r, v0, v1, v2, (double)ray->tmax, t, &b[0], &b[1]);
 }
 
+/* A ray made ready for boxes: o and 1/d, rounded; 1/0 = infinity. */
+typedef struct pti_slabs {
+    pt_real origin[3], inverse[3];
+} pti_slabs;
+
+static pti_slabs pti_slabs_from(const pti_ray *r)
+{
+    pti_slabs s;
+    int k;
+    for (k = 0; k < 3; k++) {
+        s.origin[k] = (pt_real)r->o[k];
+        s.inverse[k] = 1 / (pt_real)r->d[k];
+    }
+    return s;
+}
+
 /* Slabs [Ize13]. Near and far face are chosen by the sign of 1/d; the comparisons keep the old value where
    0 * infinity gave NaN (origin on a face, ray inside its plane), which is the conservative answer. A far
    distance is the product of three rounded operations; widening it by 1 + 2 gamma(3) outweighs the errors of
    both distances. *entry: where the box begins. */
-PTI_INLINE int pti_box(const pti_ray *r, pt_vec3 lo, pt_vec3 hi, pt_real tmax, pt_real *entry)
+PTI_INLINE int pti_box(const pti_slabs *r, pt_vec3 lo, pt_vec3 hi, pt_real tmax, pt_real *entry)
 {
     const pt_real pad = PTI_R(1 + 9 * PTI_UNIT_ROUNDOFF); /* 1 + 2 gamma(4), rounded up: d, 1/d, -, * */
     pt_real t0 = 0, t1 = tmax, n, f;
@@ -3798,9 +3833,10 @@ PTI_INLINE int pti_box(const pti_ray *r, pt_vec3 lo, pt_vec3 hi, pt_real tmax, p
 
 PTDEF int pt_intersect_box(const pt_ray *ray, pt_vec3 lo, pt_vec3 hi)
 {
-    pti_ray r = pti_ray_make(ray);
+    const pti_ray r = pti_ray_make(ray);
+    const pti_slabs slabs = pti_slabs_from(&r);
     pt_real entry;
-    return lo.x <= hi.x && lo.y <= hi.y && lo.z <= hi.z && pti_box(&r, lo, hi, ray->tmax, &entry);
+    return lo.x <= hi.x && lo.y <= hi.y && lo.z <= hi.z && pti_box(&slabs, lo, hi, ray->tmax, &entry);
 }
 
 /* The next representable number upwards, or downwards. */
@@ -4284,11 +4320,12 @@ PTI_INLINE pt_real pti_box_limit(double t)
 static int pti_traverse(const pt_scene *scene, const pti_ray *r, pti_best *best, int any)
 {
     const pt_bvh_node *nodes = scene->bvh.nodes, *node = nodes;
+    const pti_slabs slabs = pti_slabs_from(r);
     uint32_t stack[PT_BVH_MAX_DEPTH + 1];
     pt_real entries[PT_BVH_MAX_DEPTH + 1], limit = pti_box_limit(best->t), e0, e1;
     int top = 0, found = 0;
     uint32_t i;
-    if (!pti_box(r, node->lo, node->hi, limit, &e0)) return 0;
+    if (!pti_box(&slabs, node->lo, node->hi, limit, &e0)) return 0;
     for (;;) {
         if (node->count > 0) {
             for (i = 0; i < node->count; i++) {
@@ -4299,7 +4336,7 @@ static int pti_traverse(const pt_scene *scene, const pti_ray *r, pti_best *best,
             }
         } else {
             const pt_bvh_node *a = &nodes[node->first], *b = a + 1;
-            int in_a = pti_box(r, a->lo, a->hi, limit, &e0), in_b = pti_box(r, b->lo, b->hi, limit, &e1);
+            int in_a = pti_box(&slabs, a->lo, a->hi, limit, &e0), in_b = pti_box(&slabs, b->lo, b->hi, limit, &e1);
             if (in_a && in_b) {
                 int swap = e1 < e0;
                 stack[top] = node->first + (swap ? 0u : 1u);
