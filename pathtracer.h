@@ -8213,7 +8213,7 @@ static int pti_film_is_whole(FILE *file, uint64_t size)
     return fread(chunk, 1, 8, file) == 8 && pti_get_little(chunk, 8) == ~crc.sum;
 }
 
-static int pti_film_get_doubles(FILE *file, double *values, size_t count)
+static int pti_get_doubles(FILE *file, double *values, size_t count)
 {
     unsigned char chunk[PTI_FILM_CHUNK];
     while (count > 0) {
@@ -8293,7 +8293,7 @@ static pt_result pti_film_read(FILE *file, pt_film *film)
     if (fseek(file, PTI_FILM_HEAD, SEEK_SET) != 0 || !pti_film_get_ranges(file, film, head.range_count)) return PT_ERROR_FILE;
     for (k = 0; k < PTI_FILM_PLANES; k++) {
         double *values = *pti_film_plane(film, k, &channels);
-        if (values && !pti_film_get_doubles(file, values, (size_t)film->width * (size_t)film->height * channels)) return PT_ERROR_FILE;
+        if (values && !pti_get_doubles(file, values, (size_t)film->width * (size_t)film->height * channels)) return PT_ERROR_FILE;
     }
     return PT_OK;
 }
@@ -8335,15 +8335,10 @@ static int pti_merl_read_values(FILE *file, double *value)
 {
     unsigned char b[12];
     size_t i;
-    int k;
     if (fread(b, 1, 12, file) != 12 || memcmp(b, pti_merl_head, 12) != 0) return 0;
-    for (i = 0; i < 3 * (size_t)PT_MEASURED_CELLS; i++) {
-        uint64_t bits = 0;
-        if (fread(b, 1, 8, file) != 8) return 0;
-        for (k = 0; k < 8; k++) bits |= (uint64_t)b[k] << (8 * k);
-        memcpy(&value[i], &bits, 8);
+    if (!pti_get_doubles(file, value, 3 * (size_t)PT_MEASURED_CELLS)) return 0;
+    for (i = 0; i < 3 * (size_t)PT_MEASURED_CELLS; i++)
         if (!(fabs(value[i]) <= 1e30)) return 0; /* NaN, or no BRDF: sums and floats must hold it */
-    }
     return 1;
 }
 
@@ -9395,6 +9390,10 @@ static uint32_t pti_obj_path(pti_obj *o, const char *name, size_t size)
     size_t n = strlen(o->file);
     uint32_t at, i;
     while (n > 0 && o->file[n - 1] != '/' && o->file[n - 1] != '\\') n--;
+    if (size > 2 && name[0] == '.' && (name[1] == '/' || name[1] == '\\')) {
+        name += 2;
+        size -= 2;
+    }
     if (name[0] == '/' || name[0] == '\\' || (size > 1 && name[1] == ':')) n = 0;
     at = pti_obj_keep(o, o->file, n);
     if (at > 0) o->pool_count--; /* goes on behind */
