@@ -88,9 +88,12 @@ static const char *path_of(const char *name)
     return label("%s%s", place, name);
 }
 
+/* A new file each time: some file systems write one that is cut to nothing and filled again to the disk at once. */
 static void write_bytes(const char *name, const void *data, size_t size)
 {
-    FILE *const file = fopen(path_of(name), "wb");
+    FILE *file;
+    remove(path_of(name));
+    file = fopen(path_of(name), "wb");
     if (!file || fwrite(data, 1, size, file) != size) pt_check(0, "a file of the test", "%s cannot be written", name);
     if (file) fclose(file);
 }
