@@ -1613,7 +1613,7 @@ enum {
     PT_OBJ_NO_TEXTURES = 4   /* map_Kd is ignored                                                          */
 };
 
-/* How to load a model; zero means the default. */
+/* How to load a model; zero means the default. Start from PT_OBJ_OPTIONS_INIT. */
 typedef struct pt_obj_options {
     double transform[3][4];  /* rows of (A | t): p becomes A p + t; all zero = as it is. A needs an inverse; if it
                                 mirrors, corners are reordered, so that outside stays outside              */
@@ -1622,6 +1622,7 @@ typedef struct pt_obj_options {
     unsigned flags;          /* PT_OBJ_X                                                                   */
 } pt_obj_options;
 
+#define PT_OBJ_OPTIONS_INIT PTI_ZERO_INIT
 #define PT_OBJ_WARNINGS 8
 /* What was loaded, and what was not. */
 typedef struct pt_obj_info {
@@ -1651,7 +1652,7 @@ typedef struct pt_obj_info {
        Pr < 0.04                         diffuse Kd under a smooth coat of index Ni (1.5 without)
        Pr                                diffuse Kd and Blinn-Phong as wide as roughness Pr, of reflectance
                                          ((Ni - 1) / (Ni + 1))^2
-       Ks > 0, illum not 0 or 1          diffuse Kd and Phong with Ks and exponent Ns (energy-conserving)
+       Ks > 0, Ns > 0, illum not 0 or 1  diffuse Kd and Phong with Ks and exponent Ns (energy-conserving)
        else                              diffuse Kd
 
    Kd is 0.8 without a line, 1 if it is black or missing beside a map_Kd. Kd + Ks above 1 is scaled down, with a warning.
@@ -8298,7 +8299,8 @@ static pt_result pti_film_read(FILE *file, pt_film *film)
     uint32_t planes;
     pt_result result;
     int k;
-    if (size < PTI_FILM_HEAD + 8 || fread(b, 1, PTI_FILM_HEAD, file) != PTI_FILM_HEAD || memcmp(b, "ptfilm\r\n", 8) != 0) return PT_ERROR_FILE;
+    if (size < PTI_FILM_HEAD + 8 || fread(b, 1, PTI_FILM_HEAD, file) != PTI_FILM_HEAD) return PT_ERROR_FILE;
+    if (memcmp(b, "ptfilm\r\n", 8) != 0) return PT_ERROR_FILE;
     rewind(file);
     if (!pti_film_is_whole(file, (uint64_t)size)) return PT_ERROR_FILE;
     if (pti_get_little(b + 8, 4) != PTI_FILM_FORMAT) return PT_ERROR_MISMATCH;
@@ -8722,7 +8724,7 @@ static int pti_read_count(pti_bytes *b)
 /* P6 or P3 after these letters. A value has at least 1 byte, 2 as text or if it can be above 255. */
 static pt_result pti_read_ppm(pti_bytes *b, pt_image *image, int is_text)
 {
-    int width = pti_read_count(b), height = pti_read_count(b), most = pti_read_count(b), code = 0, bytes = is_text || most > 255 ? 2 : 1;
+    int width = pti_read_count(b), height = pti_read_count(b), most = pti_read_count(b), bytes = is_text || most > 255 ? 2 : 1, code = 0;
     size_t count, k;
     pti_levels levels;
     pt_result result;
@@ -8972,7 +8974,8 @@ static int pti_png_chunks(pti_png *p, unsigned char *file, size_t size)
     for (;;) {
         unsigned char *chunk = file + at, *d = chunk + 8;
         uint32_t length = size - at < 12 ? UINT32_MAX : pti_from_big_endian(chunk);
-        if (length > size - at || length + 12 > size - at || pti_crc32(0, chunk + 4, length + 4) != pti_from_big_endian(d + length)) return 0;
+        if (length > size - at || length + 12 > size - at) return 0;
+        if (pti_crc32(0, chunk + 4, length + 4) != pti_from_big_endian(d + length)) return 0;
         if (memcmp(chunk + 4, "IHDR", 4) == 0) {
             if (!pti_png_head(p, d, length)) return 0;
         } else if (p->depth == 0) {
@@ -9001,7 +9004,8 @@ typedef struct pti_png_pass {
 
 static pti_png_pass pti_png_pass_make(const pti_png *p, int k)
 {
-    static const unsigned char x[7] = {0, 4, 0, 2, 0, 1, 0}, y[7] = {0, 0, 4, 0, 2, 0, 1}, dx[7] = {8, 8, 4, 4, 2, 2, 1}, dy[7] = {8, 8, 8, 4, 4, 2, 2};
+    static const unsigned char x[7] = {0, 4, 0, 2, 0, 1, 0}, dx[7] = {8, 8, 4, 4, 2, 2, 1};
+    static const unsigned char y[7] = {0, 0, 4, 0, 2, 0, 1}, dy[7] = {8, 8, 8, 4, 4, 2, 2};
     pti_png_pass s = {0, 0, 1, 1, 0, 0, 0};
     if (p->is_interlaced) {
         s.x = x[k];
@@ -9020,11 +9024,13 @@ static int pti_png_unfilter(unsigned char *row, const unsigned char *up, size_t 
 {
     size_t k;
     int filter = row[-1];
+    if (filter > 4) return 0;
     for (k = 0; k < size; k++) {
         int a = k < pixel ? 0 : row[k - pixel], p = up ? up[k] : 0, c = up && k >= pixel ? up[k - pixel] : 0;
-        row[k] = (unsigned char)(row[k] + (filter == 0 ? 0 : filter == 1 ? a : filter == 2 ? p : filter == 3 ? (a + p) / 2 : pti_paeth(a, p, c)));
+        const int guess[5] = {0, a, p, (a + p) / 2, filter == 4 ? pti_paeth(a, p, c) : 0};
+        row[k] = (unsigned char)(row[k] + guess[filter]);
     }
-    return filter <= 4;
+    return 1;
 }
 
 /* Sample i of a row. */
@@ -9289,7 +9295,7 @@ typedef struct pti_mtl {
     int id;                  /* in the scene, -1: not yet                                                  */
 } pti_mtl;
 
-enum { PTI_MTL_KD = 1, PTI_MTL_KS = 2, PTI_MTL_KE = 4, PTI_MTL_NS = 8, PTI_MTL_NI = 16, PTI_MTL_D = 32, PTI_MTL_PR = 64, PTI_MTL_PM = 128, PTI_MTL_TR = 256, PTI_MTL_ILLUM = 512 };
+enum { PTI_MTL_KD = 1, PTI_MTL_NI = 16, PTI_MTL_D = 32, PTI_MTL_PR = 64, PTI_MTL_PM = 128, PTI_MTL_ILLUM = 512 };
 
 /* Its numbers, and the range that they are kept in: that of pt_material, of the format (Ni), or what fits a float. */
 static const struct {
@@ -9308,6 +9314,8 @@ typedef struct pti_picture {
     uint32_t path;
     pt_image image;
 } pti_picture;
+
+enum { PTI_TOLD_SCALED = 1, PTI_TOLD_NO_VT = 2, PTI_TOLD_SKIPPED = 4 };
 
 /* A loader. */
 typedef struct pti_obj {
@@ -9334,8 +9342,8 @@ typedef struct pti_obj {
     int mesh_count;
     int material;            /* of mtls, for the faces to come, -1: none                                   */
     int plain;               /* of the scene, for faces without, -1: not yet                               */
+    unsigned told;           /* PTI_TOLD_X: what is said once                                              */
 #if PTI_HAS_TEXTURES
-    int told;                /* that a face with a picture has no vt                                       */
     pti_picture *pictures;   /* that were read, owned by the scene                                         */
     uint32_t picture_count, picture_capacity;
 #endif
@@ -9364,23 +9372,40 @@ static void pti_obj_say(const pti_obj *o, char *text, const char *what, const ch
     pti_append(text, room, end);
 }
 
-static void pti_obj_warn(pti_obj *o, const char *what, const char *name, size_t size, const char *end)
+static void pti_obj_warn_of(pti_obj *o, const char *what, const char *name, size_t size, const char *end)
 {
-    if (o->info->warning_count < PT_OBJ_WARNINGS) pti_obj_say(o, o->info->warnings[o->info->warning_count], what, name, size, end);
-    o->info->warning_count++;
+    uint32_t n = o->info->warning_count++;
+    if (n < PT_OBJ_WARNINGS) pti_obj_say(o, o->info->warnings[n], what, name, size, end);
+}
+
+static void pti_obj_warn(pti_obj *o, const char *what)
+{
+    pti_obj_warn_of(o, what, "", 0, "");
+}
+
+/* A warning that is given once however often it is due. */
+static void pti_obj_tell_of(pti_obj *o, unsigned told, const char *name, size_t size, const char *end)
+{
+    if (!(o->told & told)) pti_obj_warn_of(o, "", name, size, end);
+    o->told |= told;
 }
 
 /* Ends the loading; returns 0. */
-static int pti_obj_fail(pti_obj *o, pt_result result, const char *what, const char *name, size_t size, const char *end)
+static int pti_obj_fail_of(pti_obj *o, pt_result result, const char *what, const char *name, size_t size, const char *end)
 {
     o->result = result;
     pti_obj_say(o, o->info->error, what, name, size, end);
     return 0;
 }
 
+static int pti_obj_fail(pti_obj *o, pt_result result, const char *what)
+{
+    return pti_obj_fail_of(o, result, what, "", 0, "");
+}
+
 static int pti_obj_no_memory(pti_obj *o)
 {
-    return pti_obj_fail(o, PT_ERROR_MEMORY, "out of memory", "", 0, "");
+    return pti_obj_fail(o, PT_ERROR_MEMORY, "out of memory");
 }
 
 /* Appends one element to an array of the loader, or fails. */
@@ -9433,7 +9458,8 @@ static pt_result pti_obj_open(pti_obj *o, const char *path, unsigned char **byte
     }
     if (result != PT_OK) return result;
     o->file = path;
-    o->text.at = (const char *)*bytes + (memcmp(*bytes, "\xef\xbb\xbf", size < 3 ? 0 : 3) == 0 && size >= 3 ? 3 : 0); /* byte order mark */
+    o->text.at = (const char *)*bytes;
+    if (strncmp(o->text.at, "\xef\xbb\xbf", 3) == 0) o->text.at += 3; /* a byte order mark */
     o->text.line = 1;
     return PT_OK;
 }
@@ -9492,10 +9518,11 @@ static int pti_mtl_begin(pti_obj *o)
 static void pti_mtl_number(pti_obj *o, pti_mtl *m, int key)
 {
     const char *name = pti_mtl_keys[key].key;
-    double v[3], *to = (double *)(void *)((char *)m + pti_mtl_keys[key].offset), lo = pti_mtl_keys[key].lo, hi = pti_mtl_keys[key].hi;
+    double v[3], *to = (double *)(void *)((char *)m + pti_mtl_keys[key].offset);
+    double lo = pti_mtl_keys[key].lo, hi = pti_mtl_keys[key].hi;
     int count = pti_mtl_keys[key].count, n = pti_take_numbers(&o->text, v, count), k, outside = 0;
     if (n != 1 && n != count) {
-        pti_obj_warn(o, "", name, strlen(name), " without its numbers is ignored");
+        pti_obj_warn_of(o, "", name, strlen(name), " without its numbers is ignored");
         return;
     }
     for (k = 0; k < count; k++) {
@@ -9503,14 +9530,15 @@ static void pti_mtl_number(pti_obj *o, pti_mtl *m, int key)
         outside |= !(to[k] >= lo && to[k] <= hi);
         to[k] = to[k] > lo ? (to[k] < hi ? to[k] : hi) : lo;
     }
-    if (outside) pti_obj_warn(o, "", name, strlen(name), " is out of range");
+    if (outside) pti_obj_warn_of(o, "", name, strlen(name), " is out of range");
     if (!(outside && 1 << key == PTI_MTL_NI)) m->given |= 1u << key;
 }
 
 /* map_Kd: options, then a name. -s u v is how often the picture is repeated; the others are skipped. */
 static int pti_mtl_map(pti_obj *o, pti_mtl *m)
 {
-    static const char *const options[12] = {"-s", "-o", "-t", "-mm", "-bm", "-clamp", "-blendu", "-blendv", "-cc", "-texres", "-imfchan", "-boost"};
+    static const char *const options[12] = {"-s",      "-o",      "-t",  "-mm",     "-bm",      "-clamp",
+                                            "-blendu", "-blendv", "-cc", "-texres", "-imfchan", "-boost"};
     const char *word;
     size_t size;
     for (;;) {
@@ -9529,7 +9557,7 @@ static int pti_mtl_map(pti_obj *o, pti_mtl *m)
             else break;
         }
         if (n == 0) pti_take_word(&o->text, &before.at);
-        if (k > 0) pti_obj_warn(o, "option ", word, size, " of map_Kd is skipped");
+        if (k > 0) pti_obj_warn_of(o, "option ", word, size, " of map_Kd is skipped");
         for (n = 0; k == 0 && n < 2; n++) m->scale[n] = fabs(v[n]) <= 1e6 ? v[n] : 1;
     }
     size = pti_take_rest(&o->text, &word);
@@ -9578,7 +9606,7 @@ static int pti_mtl_read(pti_obj *o, const char *name, size_t size)
         o->library = at;
         for (; *o->text.at && o->result == PT_OK; pti_next_line(&o->text))
             if (!pti_mtl_line(o)) break;
-        if (first == o->mtl_count) pti_obj_warn(o, "no newmtl in it", "", 0, "");
+        if (first == o->mtl_count) pti_obj_warn(o, "no newmtl in it");
         pti_free(bytes, o->scene->alloc_user);
     }
     pti_free(path, o->scene->alloc_user);
@@ -9597,7 +9625,7 @@ static int pti_obj_libraries(pti_obj *o)
     if ((o->options.flags & PT_OBJ_NO_MTL) || (size > 0 && pti_mtl_read(o, name, size))) return 1;
     o->text = line;
     while (o->result == PT_OK && (size = pti_take_word(&o->text, &name)) > 0)
-        if (!pti_mtl_read(o, name, size) && o->result == PT_OK) pti_obj_warn(o, "cannot read ", name, size, "");
+        if (!pti_mtl_read(o, name, size) && o->result == PT_OK) pti_obj_warn_of(o, "cannot read ", name, size, "");
     return o->result == PT_OK;
 }
 
@@ -9638,7 +9666,9 @@ static pt_material pti_mtl_glossy(pti_obj *o, const pti_mtl *s, pt_material_kind
     double most = 1;
     int k;
     for (k = 0; k < 3; k++) most = fmax(most, kd[k] + ks[k]);
-    if (most > 1) pti_obj_warn(o, "", o->pool + s->name, strlen(o->pool + s->name), ": diffuse and specular exceed 1 and are scaled down");
+    if (most > 1)
+        pti_obj_tell_of(o, PTI_TOLD_SCALED, o->pool + s->name, strlen(o->pool + s->name),
+                        ": diffuse and specular exceed 1 and are scaled down, here and elsewhere");
     m.albedo = pti_mtl_rgb(kd, 1 / most);
     m.specular = pti_mtl_rgb(ks, 1 / most);
     m.exponent = (pt_real)exponent;
@@ -9674,7 +9704,7 @@ static pt_material pti_mtl_surface(pti_obj *o, const pti_mtl *s)
     } else if (s->given & PTI_MTL_PR) {
         ks[0] = ks[1] = ks[2] = f0 * f0;
         m = pti_mtl_glossy(o, s, PT_MATERIAL_BLINN, kd, ks, 2 / (pr * pr * pr * pr) - 2);
-    } else if (pti_mtl_max(s->ks) > 0 && illum > 1) {
+    } else if (pti_mtl_max(s->ks) > 0 && s->ns > 0 && illum > 1) {
         m = pti_mtl_glossy(o, s, PT_MATERIAL_PHONG, kd, s->ks, s->ns);
     } else {
         m = pt_material_diffuse(pti_mtl_rgb(kd, 1));
@@ -9686,12 +9716,11 @@ static pt_material pti_mtl_surface(pti_obj *o, const pti_mtl *s)
 /* Gives a block to the scene; 0: no memory, the block is freed. */
 static int pti_scene_own(pt_scene *scene, void *block)
 {
-    if (block && pti_reserve(&scene->owned, &scene->owned_capacity, (size_t)scene->owned_count + 1, sizeof *scene->owned, scene->alloc_user)) {
-        scene->owned[scene->owned_count++] = block;
-        return 1;
-    }
-    pti_free(block, scene->alloc_user);
-    return 0;
+    void *user = scene->alloc_user;
+    int ok = block && pti_reserve(&scene->owned, &scene->owned_capacity, (size_t)scene->owned_count + 1, sizeof *scene->owned, user);
+    if (ok) scene->owned[scene->owned_count++] = block;
+    else pti_free(block, user);
+    return ok;
 }
 
 /* The picture of a path, read once; NULL: it cannot be read (a warning), or no memory. */
@@ -9707,7 +9736,10 @@ static const pt_image *pti_obj_picture(pti_obj *o, uint32_t path)
     p.path = path;
     p.image.alloc_user = o->scene->alloc_user;
     result = pt_read_image(name, &p.image);
-    if (result == PT_ERROR_FILE) pti_obj_warn(o, "no PPM, PFM or PNG: ", name, strlen(name), "; Kd alone is used");
+    if (result == PT_ERROR_FILE) {
+        const char *last = strrchr(name, '/') ? strrchr(name, '/') + 1 : name;
+        pti_obj_warn_of(o, "no PPM, PFM or PNG: ", last, strlen(last), "; Kd alone is used");
+    }
     if (result == PT_ERROR_MEMORY) pti_obj_no_memory(o);
     if (result != PT_OK) return NULL;
     for (i = 0; i < 3 * (size_t)p.image.width * (size_t)p.image.height; i++) { /* a reflectance; a PFM may hold anything */
@@ -9724,13 +9756,14 @@ static const pt_image *pti_obj_picture(pti_obj *o, uint32_t path)
 }
 #endif
 
-/* Lets the picture of map_Kd multiply the albedo; what has none goes without. */
+/* Lets the picture of map_Kd multiply the albedo; what does not come from Kd goes without. */
 static int pti_obj_texture(pti_obj *o, const pti_mtl *s, pt_material *m)
 {
+    int wanted = s->map > 0 && !(o->options.flags & PT_OBJ_NO_TEXTURES) && m->kind != PT_MATERIAL_DIELECTRIC && m->kind != PT_MATERIAL_MIRROR;
 #if PTI_HAS_TEXTURES
     const pt_image *image;
     pt_texture *t;
-    if (s->map == 0 || (o->options.flags & PT_OBJ_NO_TEXTURES) || m->kind == PT_MATERIAL_DIELECTRIC || m->kind == PT_MATERIAL_MIRROR) return 1;
+    if (!wanted) return 1;
     image = pti_obj_picture(o, s->map);
     if (!image) return o->result == PT_OK;
     t = (pt_texture *)pti_alloc_zero(1, sizeof *t, o->scene->alloc_user);
@@ -9741,7 +9774,7 @@ static int pti_obj_texture(pti_obj *o, const pti_mtl *s, pt_material *m)
     t->scale = pt_v2((pt_real)s->scale[0], (pt_real)s->scale[1]);
     m->texture = t;
 #else
-    if (s->map > 0 && !(o->options.flags & PT_OBJ_NO_TEXTURES) && m->kind != PT_MATERIAL_DIELECTRIC && m->kind != PT_MATERIAL_MIRROR)
+    if (wanted)
         pti_scene_fail(o->scene, PT_ERROR_LEFT_OUT, "material", o->scene->material_count, "textures were left out: PT_NO_TEXTURES");
 #endif
     return 1;
@@ -9752,7 +9785,7 @@ static int pti_obj_add_material(pti_obj *o, pt_material m)
 {
     int id = o->scene->error == PT_OK ? pt_add_material(o->scene, m) : -1;
     if (id >= 0) o->info->materials++;
-    else pti_obj_fail(o, o->scene->error, pt_scene_error(o->scene), "", 0, "");
+    else pti_obj_fail(o, o->scene->error, pt_scene_error(o->scene));
     return id;
 }
 
@@ -9793,7 +9826,7 @@ static int pti_obj_use(pti_obj *o)
     slot = pti_obj_name(o, name, size, &hash);
     if (!slot) return pti_obj_no_memory(o);
     o->material = (int)slot->id - 1;
-    if (slot->id == 0) pti_obj_warn(o, "no newmtl ", name, size, "");
+    if (slot->id == 0) pti_obj_warn_of(o, "no newmtl ", name, size, "");
     return 1;
 }
 
@@ -9805,13 +9838,13 @@ static int pti_obj_position(pti_obj *o)
     const double (*a)[4] = (const double (*)[4])o->options.transform;
     pt_vec3 v;
     int k;
-    if (pti_take_numbers(&o->text, p, 3) != 3) return pti_obj_fail(o, PT_ERROR_FILE, "'v' without three numbers", "", 0, "");
+    if (pti_take_numbers(&o->text, p, 3) != 3) return pti_obj_fail(o, PT_ERROR_FILE, "'v' without three numbers");
     for (k = 0; k < 3; k++) {
         q[k] = a[k][0] * p[0] + a[k][1] * p[1] + a[k][2] * p[2] + a[k][3];
-        if (!(fabs(q[k]) <= PT_MAX_COORDINATE)) return pti_obj_fail(o, PT_ERROR_FILE, "a coordinate beyond 1e18", "", 0, "");
+        if (!(fabs(q[k]) <= PT_MAX_COORDINATE)) return pti_obj_fail(o, PT_ERROR_FILE, "a coordinate beyond 1e18");
     }
     v = pt_v3((pt_real)q[0], (pt_real)q[1], (pt_real)q[2]);
-    if (pti_coordinate_bad(v, &bad)) return pti_obj_fail(o, PT_ERROR_FILE, "a coordinate beyond 1e18", "", 0, "");
+    if (pti_coordinate_bad(v, &bad)) return pti_obj_fail(o, PT_ERROR_FILE, "a coordinate beyond 1e18");
     return PTI_OBJ_PUSH(o, v, v_count, v_capacity, v);
 }
 
@@ -9825,7 +9858,7 @@ static int pti_obj_normal(pti_obj *o)
         n = pti_d_normalize(pti_d(c[0][0] * v[0] + c[0][1] * v[1] + c[0][2] * v[2], c[1][0] * v[0] + c[1][1] * v[1] + c[1][2] * v[2],
                                   c[2][0] * v[0] + c[2][1] * v[1] + c[2][2] * v[2]));
     if (!(pti_d_dot(n, n) > 0.5)) {
-        pti_obj_warn(o, "a normal that is 0 or no number: faces with it are flat", "", 0, "");
+        pti_obj_warn(o, "a normal that is 0 or no number: faces with it are flat");
         n = pti_d(0, 0, 0);
     }
     return PTI_OBJ_PUSH(o, vn, vn_count, vn_capacity, pti_d_to(n));
@@ -9835,7 +9868,7 @@ static int pti_obj_uv(pti_obj *o)
 {
     double v[2] = {0, 0};
     if (pti_take_numbers(&o->text, v, 2) < 1 || !(fabs(v[0]) <= PT_MAX_COORDINATE && fabs(v[1]) <= PT_MAX_COORDINATE)) {
-        pti_obj_warn(o, "'vt' that is no number or beyond 1e18 is taken as 0", "", 0, "");
+        pti_obj_warn(o, "'vt' that is no number or beyond 1e18 is taken as 0");
         v[0] = v[1] = 0;
     }
     return PTI_OBJ_PUSH(o, vt, vt_count, vt_capacity, pt_v2((pt_real)v[0], (pt_real)v[1]));
@@ -9849,7 +9882,7 @@ static int pti_obj_index(pti_obj *o, uint32_t count, uint32_t *index)
     uint64_t i = 0;
     for (p += minus; *p >= '0' && *p <= '9'; p++)
         if (i < 10000000000u) i = 10 * i + (uint64_t)(*p - '0');
-    if (i == 0 || i > count) return pti_obj_fail(o, PT_ERROR_FILE, "index ", word, strcspn(word, " \t\r\n"), " points nowhere");
+    if (i == 0 || i > count) return pti_obj_fail_of(o, PT_ERROR_FILE, "index ", word, strcspn(word, " \t\r\n"), " points nowhere");
     o->text.at = p;
     *index = (uint32_t)(minus ? count - i : i - 1);
     return 1;
@@ -9869,7 +9902,7 @@ static int pti_obj_corner(pti_obj *o)
         o->text.at++;
         if (!pti_word_ends(o->text.at) && !pti_obj_index(o, o->vn_count, &c.vn)) return 0;
     }
-    if (!pti_word_ends(o->text.at)) return pti_obj_fail(o, PT_ERROR_FILE, "no corner of a face: ", word, strcspn(word, " \t\r\n"), "");
+    if (!pti_word_ends(o->text.at)) return pti_obj_fail_of(o, PT_ERROR_FILE, "no corner of a face: ", word, strcspn(word, " \t\r\n"), "");
     return PTI_OBJ_PUSH(o, face, face_count, face_capacity, c);
 }
 
@@ -9932,7 +9965,8 @@ static int pti_obj_triangle(pti_obj *o, uint32_t i, uint32_t j, uint32_t k, int 
         t.v[n] += scene->position_count;
         pti_obj_widen(o->info, o->v[f[corner[n]].v]);
     }
-    if (!pti_reserve(&scene->triangles, &scene->triangle_capacity, (size_t)scene->triangle_count + 1, sizeof t, scene->alloc_user)) return pti_obj_no_memory(o);
+    if (!pti_reserve(&scene->triangles, &scene->triangle_capacity, (size_t)scene->triangle_count + 1, sizeof t, scene->alloc_user))
+        return pti_obj_no_memory(o);
     scene->triangles[scene->triangle_count++] = t;
     o->info->triangles++;
     if (!pti_rgb_black(scene->materials[material].emission)) o->info->emissive_triangles++;
@@ -10013,7 +10047,7 @@ static int pti_obj_cut(pti_obj *o, int material)
     }
     ears = o->info->triangles;
     for (i = 1; ok && i + 1 < n; i++) ok = pti_obj_triangle(o, ring[0], ring[i], ring[i + 1], material);
-    if (n > 3 && o->info->triangles > ears) pti_obj_warn(o, "a polygon that crosses itself: some of it is cut as a fan", "", 0, "");
+    if (n > 3 && o->info->triangles > ears) pti_obj_warn(o, "a polygon that crosses itself: some of it is cut as a fan");
     return ok;
 }
 
@@ -10024,7 +10058,7 @@ static int pti_obj_polygon(pti_obj *o, int material)
     if (n > 3) pti_obj_look(o);
     for (i = 0; convex && n > 3 && i < n; i++) convex = pti_obj_turn(o, i, (i + 1) % n, (i + 2) % n) > 0;
     if (!convex && n <= PTI_EARS_MAX) return pti_obj_cut(o, material);
-    if (!convex) pti_obj_warn(o, "a polygon of more than 1024 corners that is not convex is cut as a fan", "", 0, "");
+    if (!convex) pti_obj_warn(o, "a polygon of more than 1024 corners that is not convex is cut as a fan");
     for (i = 1; i + 1 < n; i++)
         if (!pti_obj_triangle(o, 0, i, i + 1, material)) return 0;
     return 1;
@@ -10049,10 +10083,8 @@ static int pti_obj_face(pti_obj *o)
     material = pti_obj_material(o);
     if (material < 0 || !pti_obj_polygon(o, material)) return 0;
 #if PTI_HAS_TEXTURES
-    if (!has_vt && !o->told && o->scene->materials[material].texture) {
-        pti_obj_warn(o, "a face without vt has a picture: each triangle shows its corner", "", 0, "");
-        o->told = 1;
-    }
+    if (!has_vt && o->scene->materials[material].texture)
+        pti_obj_tell_of(o, PTI_TOLD_NO_VT, "", 0, "a face with a picture has no vt, here and elsewhere: each triangle shows its corner");
 #endif
     if (o->info->triangles == before) o->info->degenerate_faces++;
     return 1;
@@ -10075,7 +10107,8 @@ static int pti_obj_line(pti_obj *o)
     if (pti_word_is(word, size, "usemtl")) return pti_obj_use(o);
     if (pti_word_is(word, size, "mtllib")) return pti_obj_libraries(o);
     if (pti_word_is(word, size, "g") || pti_word_is(word, size, "o") || pti_word_is(word, size, "s")) return 1;
-    if (o->info->skipped_lines++ == 0) pti_obj_warn(o, "", word, size, " is skipped, and what else is no face");
+    pti_obj_tell_of(o, PTI_TOLD_SKIPPED, word, size, " is skipped, and what else is no face");
+    o->info->skipped_lines++;
     return 1;
 }
 
@@ -10086,14 +10119,15 @@ static int pti_obj_read(pti_obj *o, const char *path)
     o->file = path ? path : "";
     result = pti_obj_open(o, path, &bytes);
     if (result == PT_ERROR_MEMORY) return pti_obj_no_memory(o);
-    if (result != PT_OK)
-        return pti_obj_fail(o, PT_ERROR_FILE, result == PT_ERROR_ARGUMENT ? "is larger than 2 GiB" : result == PT_ERROR_SCENE ? "is not a text" : "cannot be read", "", 0, "");
+    if (result == PT_ERROR_ARGUMENT) return pti_obj_fail(o, PT_ERROR_FILE, "is larger than 2 GiB");
+    if (result == PT_ERROR_SCENE) return pti_obj_fail(o, PT_ERROR_FILE, "is not a text");
+    if (result != PT_OK) return pti_obj_fail(o, PT_ERROR_FILE, "cannot be read");
     for (; *o->text.at && o->result == PT_OK; pti_next_line(&o->text))
         if (!pti_obj_line(o)) break;
     pti_free(bytes, o->scene->alloc_user);
     if (o->result == PT_OK && o->info->triangles == 0) {
         o->text.line = 0;
-        pti_obj_fail(o, PT_ERROR_FILE, "holds no triangle with an area", "", 0, "");
+        pti_obj_fail(o, PT_ERROR_FILE, "holds no triangle with an area");
     }
     return o->result == PT_OK;
 }
@@ -10107,19 +10141,22 @@ static int pti_obj_prepare(pti_obj *o)
         for (k = 0; k < 4; k++) zero = fmax(zero, a[i][k] == 0 ? 0 : 1); /* NaN too is not 0 */
     for (i = 0; zero == 0 && i < 3; i++) a[i][i] = 1;
     for (i = 0; i < 3; i++)
-        for (k = 0; k < 3; k++)
-            o->cofactor[i][k] = a[(i + 1) % 3][(k + 1) % 3] * a[(i + 2) % 3][(k + 2) % 3] - a[(i + 1) % 3][(k + 2) % 3] * a[(i + 2) % 3][(k + 1) % 3];
+        for (k = 0; k < 3; k++) {
+            const double *b = a[(i + 1) % 3], *c = a[(i + 2) % 3];
+            o->cofactor[i][k] = b[(k + 1) % 3] * c[(k + 2) % 3] - b[(k + 2) % 3] * c[(k + 1) % 3];
+        }
     for (k = 0; k < 3; k++) det += a[0][k] * o->cofactor[0][k];
-    if (det == 0 || !pti_finite(det) || !pti_finite(a[0][3] + a[1][3] + a[2][3])) return pti_obj_fail(o, PT_ERROR_ARGUMENT, "the transform is not finite or has no inverse", "", 0, "");
+    if (det == 0 || !pti_finite(det) || !pti_finite(a[0][3] + a[1][3] + a[2][3]))
+        return pti_obj_fail(o, PT_ERROR_ARGUMENT, "the transform is not finite or has no inverse");
     o->mirrors = det < 0;
     for (i = 0; o->mirrors && i < 3; i++)
         for (k = 0; k < 3; k++) o->cofactor[i][k] = -o->cofactor[i][k];
     if (!(o->options.emission_scale >= 0) || !pti_finite(o->options.emission_scale))
-        return pti_obj_fail(o, PT_ERROR_ARGUMENT, "the scale of the emission is negative or not finite", "", 0, "");
+        return pti_obj_fail(o, PT_ERROR_ARGUMENT, "the scale of the emission is negative or not finite");
     if (!(o->options.flags & PT_OBJ_MATERIAL)) return 1;
     o->plain = o->options.material;
     if (o->plain >= 0 && (uint32_t)o->plain < o->scene->material_count) return 1;
-    return pti_obj_fail(o, PT_ERROR_ARGUMENT, "the material of the options does not exist", "", 0, "");
+    return pti_obj_fail(o, PT_ERROR_ARGUMENT, "the material of the options does not exist");
 }
 
 /* Gives the vertices to the scene, for which all memory is asked first. Those without vt or vn have 0 there, and no
@@ -10185,7 +10222,7 @@ PTDEF pt_result pt_load_obj(pt_scene *scene, const char *path, const pt_obj_opti
     if (options) o.options = *options;
     memset(o.info, 0, sizeof *o.info);
     if (scene->error != PT_OK) {
-        pti_obj_fail(&o, scene->error, pt_scene_error(scene), "", 0, "");
+        pti_obj_fail(&o, scene->error, pt_scene_error(scene));
         return o.result;
     }
     if (pti_obj_prepare(&o) && pti_obj_read(&o, path)) pti_obj_finish(&o);

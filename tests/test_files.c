@@ -566,6 +566,7 @@ static const struct {
     {"Kd 0.5 0.5 0.5\nKs 0.25 0.25 0.25\nNs 40\nillum 1", PT_MATERIAL_DIFFUSE, 0.5, 0, 0, 0, 0, 0, 0, 0},
     {"Kd 0.75 0 0\nKs 0.25 0.75 0.5\nNs 9", PT_MATERIAL_PHONG, 0.75, 0, 0, 0, 0.25, 9, 0, 0},
     {"Kd 1 0 0\nKs 1 0 0\nNs 9", PT_MATERIAL_PHONG, 0.5, 0, 0, 0, 0.5, 9, 0, 1},
+    {"Kd 0.5 0.5 0.5\nKs 0.9 0.9 0.9\nNs 0\nillum 2", PT_MATERIAL_DIFFUSE, 0.5, 0, 0, 0, 0, 0, 0, 0},
     {"Kd 0.5 0.5 0.5\nKs 0 0 0\nNs 40\nillum 2", PT_MATERIAL_DIFFUSE, 0.5, 0, 0, 0, 0, 0, 0, 0},
     {"Kd 0.01 0.01 0.01\nKs 0.75 0.5 0.5\nNs 1000\nillum 5", PT_MATERIAL_MIRROR, 0.75, 0, 0, 0, 0, 0, 0, 0},
     {"Kd 0 0 0\nKs 0.75 0.5 0.5\nillum 3", PT_MATERIAL_MIRROR, 0.75, 0, 0, 0, 0, 0, 0, 0},
@@ -719,7 +720,7 @@ static void mtl_textures(void)
     pt_check(s.materials[2].texture && s.materials[2].texture->rgb[0] == 1 && s.materials[2].texture->rgb[1] == 0 && s.materials[2].texture->rgb[2] == 0.5f, "a reflectance", "is not in [0,1]");
     pt_check(s.materials[3].texture == NULL && s.materials[3].albedo.r == (pt_real)0.25 && s.materials[4].texture == NULL && s.materials[5].texture == NULL && s.materials[6].texture == NULL, "no picture", "there is one");
     pt_check(info.warning_count == 4 && strstr(info.warnings[0], "tex.mtl:3: option '-clamp'") && strstr(info.warnings[1], "tex.mtl:3: option '-o'") &&
-                 strstr(info.warnings[2], "model.obj:13: a face without vt") && strstr(info.warnings[3], "tex.mtl:9: no PPM, PFM or PNG: '"),
+                 strstr(info.warnings[2], "model.obj:13: a face with a picture has no vt") && strstr(info.warnings[3], "tex.mtl:9: no PPM, PFM or PNG: 'test_files.map.jpg'; Kd"),
              "options and files that are skipped", "%u: %s; %s; %s", (unsigned)info.warning_count, info.warnings[1], info.warnings[2], info.warnings[3]);
     pt_check(pt_commit(&s) == PT_OK && pt_scene_needs(&s) & PT_NEEDS_TEXTURES && look(&s, 0.25, 0.25, &hit), "the textured scene", "%s", pt_scene_error(&s));
     pt_check(pt_texture_eval(b, pt_v2((pt_real)0.25, (pt_real)0.75), v3(0, 0, 0)).r == 1 && pt_texture_eval(b, pt_v2((pt_real)0.75, (pt_real)0.25), v3(0, 0, 0)).b == 1, "pixels", "are turned");
