@@ -7888,6 +7888,10 @@ PTDEF pt_rgbd pt_li_branching(const pt_scene *scene, const pt_ray *ray, pt_sampl
    compared with what is left of it, each index with what it points into, and each number with its range. Files of
    more than 2 GiB are refused, but for films. Numbers in texts are parsed here: strtod would obey the locale.
 
+   Models: one pass over the text, in time that grows as its length does. Each combination of v, vt and vn becomes one
+   vertex, found by its hash; a material is added when a face first needs it, and a picture is read once. Only cutting a
+   polygon that is not convex takes longer than its corners are many, and is therefore limited to 1024 of them.
+
    A film file: 64 bytes of head (see pti_film_head), the ranges of samples (first and end, 32 bits each), the sums as
    64-bit floats in the order of pti_film_plane, and the CRC-64 of all that [ECMA 182, reflected]. Everything is
    little-endian. A CRC finds every change within 8 consecutive bytes, and misses others once in 2^64. */
