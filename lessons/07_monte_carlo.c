@@ -30,7 +30,7 @@
               unbiased 无偏; biased 有偏; consistent 一致; Monte Carlo 蒙特卡洛; convergence 收敛;
               root mean square error 均方根误差
 
-   HEADER     [PT-03] pt_stats_add, pt_stats_standard_error, pt_estimate_mean, [PT-02] pt_sampler_2d, [PT-18] pt_report_write_svg
+   HEADER     [PT-03] pt_stats_add, pt_estimate_mean, [PT-02] pt_sampler_2d, [PT-18] pt_report_write_svg
 
    SOURCES    [PBR] 2.1; Hammersley, Handscomb: Monte Carlo Methods, 1964; [Vea97] 2; [Che83]
 
