@@ -128,7 +128,10 @@ static void table(const char *who, void (*terms)(pt_ray, pt_sampler *, double *)
             double value[EDGES] = {0}, all = 0;
             pt_sampler_start(&random, 0, (uint32_t)sum.n);
             terms(ray, &random, value);
-            for (int k = 0; k < EDGES; all += value[k++]) pt_stats_add(&term[k], value[k]);
+            for (int k = 0; k < EDGES; k++) {
+                pt_stats_add(&term[k], value[k]);
+                all += value[k];
+            }
             pt_stats_add(&sum, all);
         }
         row(name, &sum, (1 - pow(rho, EDGES)) / (1 - rho), pt_cpu_seconds() - seconds);
@@ -181,9 +184,9 @@ int main(int argc, char **argv)
 {
     double most = (argc > 1 ? fmax(atof(argv[1]), 4096) : 65536) / (getenv("SHORT") ? 16 : 1);
     pt_camera camera;
-    int ok = pt_scene_furnace(&scene, &camera) == PT_OK;
+    if (pt_scene_furnace(&scene, &camera) != PT_OK) return 1;
     scene.materials[0].albedo = pt_rgb_grey((pt_real)rho);
-    check(ok && pt_commit(&scene) == PT_OK, "the furnace is ready");
+    check(pt_commit(&scene) == PT_OK, "the furnace is ready");
     printf("%-14s %9s %12s %12s %10s %8s\n", "edge by edge", "samples", "estimate", "exact", "std.error", "seconds");
     table("my", my_terms, 4.0 / 3, most);
     table("its", its_terms, 1, most); /* f cos / p = rho always: lesson 09 */
