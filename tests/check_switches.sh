@@ -332,6 +332,11 @@ refusals()
     else
         skip "-ffast-math: $CC does not tell of it"
     fi
+    if echo | $CC -mfpmath=387 -dM -E - 2> /dev/null | grep -q '__FLT_EVAL_METHOD__ 2'; then
+        must_fail 'x87 arithmetic' 'x87' -mfpmath=387 "$dir/one.c"
+    else
+        skip "x87 arithmetic: $CC has none, or does not tell of it"
+    fi
 }
 
 # names SWITCH NEEDS: what the statements NEEDS ask for is refused with a sentence that names the switch
