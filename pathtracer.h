@@ -11126,7 +11126,7 @@ static void pti_svg_grid(pti_writer *w, const pti_axes *a)
         pti_svg_text(w, left - 8, pti_svg_y(a, v) + 4, "end", "", text);
     }
     pti_svg_text(w, (left + right) / 2, PTI_SVG_H - 14, "middle", "", "CPU seconds");
-    pti_svg_text(w, 16, (top + bottom) / 2, "middle", "transform=\"rotate(-90 16 192)\"", "square root of relMSE");
+    pti_svg_text(w, 16, (top + bottom) / 2, "middle", "transform=\"rotate(-90 16 212.5)\"", "square root of relMSE");
 }
 
 /* A dashed line of slope -1/2 through (x, y), cut to the axes. */

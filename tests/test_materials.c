@@ -1005,6 +1005,33 @@ static int extreme_draws(const pt_material *m, pt_pcg32 *rng, double most)
     return bad;
 }
 
+/* One band of it is what `user` points to: negative, NaN, infinite. */
+typedef struct bad_band {
+    int band;
+    double value;
+} bad_band;
+static pt_rgb one_bad_band(void *user, pt_vec3 wo, pt_vec3 wi)
+{
+    const bad_band *const b = (const bad_band *)user;
+    (void)wo;
+    (void)wi;
+    return rgb(b->band == 0 ? b->value : 0.1, b->band == 1 ? b->value : 0.1, b->band == 2 ? b->value : 0.1);
+}
+static void refused_brdfs(void)
+{
+    static const double values[3] = {-0.1, HUGE_VAL - HUGE_VAL, HUGE_VAL};
+    int i;
+    for (i = 0; i < 9; i++) {
+        bad_band b = {0, 0};
+        pt_measured m = PT_MEASURED_INIT;
+        b.band = i % 3;
+        b.value = values[i / 3];
+        pt_check(pt_measured_fill(&m, one_bad_band, &b) == PT_ERROR_ARGUMENT && !m.value, "table of a bad BRDF",
+                 "band %d = %g was taken", b.band, b.value);
+        pt_measured_free(&m);
+    }
+}
+
 static void extremes_of_tables(void)
 {
     pt_pcg32 rng = generator(762);
@@ -1736,6 +1763,7 @@ int main(int argc, char **argv)
     PT_TEST_EXACT(phong_peak);
     PT_TEST_EXACT(extremes);
     PT_TEST_EXACT(extremes_of_tables);
+    PT_TEST_EXACT(refused_brdfs);
     PT_TEST_EXACT(no_gain);
     PT_TEST_EXACT(table_index);
     PT_TEST_EXACT(filled_tables);
