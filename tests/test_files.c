@@ -75,15 +75,16 @@ static pt_vec3 v3(double x, double y, double z) { return pt_v3((pt_real)x, (pt_r
 static int same3(pt_vec3 a, pt_vec3 b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
 static double far3(pt_vec3 a, pt_vec3 b) { return (double)pt_v3_length(pt_v3_sub(a, b)); }
 
-/* The path of a file of this test; holds for the next three calls. */
+/* The path of a file of this test; holds for the next three calls. It does not begin as the program's own name, which
+   a mutant that is cut short could name. */
 static const char *path_of(const char *name)
 {
     static const char *place;
     if (!place) {
-        FILE *const probe = fopen("build/test/test_files.probe", "wb");
-        place = probe ? "build/test/test_files." : "test_files.";
+        FILE *const probe = fopen("build/test/of_files.probe", "wb");
+        place = probe ? "build/test/of_files." : "of_files.";
         if (probe) fclose(probe);
-        remove("build/test/test_files.probe");
+        remove("build/test/of_files.probe");
     }
     return label("%s%s", place, name);
 }
@@ -604,7 +605,7 @@ static void obj_errors(void)
              "bytes that are no text", "%s", info.error);
     remove(path_of("model.obj"));
     pt_check(pt_load_obj(&s, path_of("model.obj"), NULL, &info) == PT_ERROR_FILE &&
-                 strstr(info.error, "test_files.model.obj: cannot be read"),
+                 strstr(info.error, "of_files.model.obj: cannot be read"),
              "no file", "%s", info.error);
     pt_check(pt_load_obj(&s, NULL, NULL, &info) == PT_ERROR_FILE &&
                  pt_load_obj(&s, "", NULL, NULL) == PT_ERROR_FILE &&
@@ -700,7 +701,7 @@ static void mtl_table(void)
 {
     char text[200];
     size_t i;
-    write_text("model.obj", "mtllib test_files.model.mtl\n" TRIANGLE "usemtl a\nf 1 2 3\n");
+    write_text("model.obj", "mtllib of_files.model.mtl\n" TRIANGLE "usemtl a\nf 1 2 3\n");
     for (i = 0; i < sizeof MATERIALS / sizeof MATERIALS[0]; i++) {
         pt_scene s = PT_SCENE_INIT;
         pt_obj_info info;
@@ -759,7 +760,7 @@ static void mtl_files(void)
     memset(&o, 0, sizeof o);
     o.emission_scale = 2.5;
     r = load(&s,
-             "mtllib test_files.a b.mtl\nmtllib .\\test_files.c.mtl nowhere.mtl\n" TRIANGLE
+             "mtllib of_files.a b.mtl\nmtllib .\\of_files.c.mtl nowhere.mtl\n" TRIANGLE
              "f 1 2 3\nusemtl two words  \nf 1 2 3\nusemtl a\nf 1 2 3\nusemtl c\nf 1 2 3\nusemtl d\nf 1 2 "
              "3\nusemtl a\nf 1 2 3\nusemtl c\nf 3 2 1\n",
              &o, &info);
@@ -780,11 +781,10 @@ static void mtl_files(void)
              info.warnings[1]);
     pt_check(info.skipped_lines == 3, "lines that are skipped", "%u", (unsigned)info.skipped_lines);
     o.flags = PT_OBJ_NO_MTL;
-    r = load(&s, "mtllib test_files.a b.mtl\n" TRIANGLE "usemtl a\nf 1 2 3\n", &o, &info);
+    r = load(&s, "mtllib of_files.a b.mtl\n" TRIANGLE "usemtl a\nf 1 2 3\n", &o, &info);
     pt_check(r == PT_OK && s.materials[0].albedo.r == (pt_real)0.8 && info.warning_count == 0,
              "PT_OBJ_NO_MTL", "%s", info.warnings[0]);
-    r = load(&s,
-             "mtllib no.mtl\nmtllib test_files.model.obj\nmtllib\n" TRIANGLE "usemtl a\nusemtl\nf 1 2 3\n",
+    r = load(&s, "mtllib no.mtl\nmtllib of_files.model.obj\nmtllib\n" TRIANGLE "usemtl a\nusemtl\nf 1 2 3\n",
              NULL, &info);
     pt_check(r == PT_OK && info.warning_count == 4, "MTL files that are none", "%u warnings",
              (unsigned)info.warning_count);
@@ -825,9 +825,9 @@ static void mtl_textures(void)
     static const unsigned char rgb[12] = {255, 0, 0, 0, 255, 0, 0, 0, 255, 255, 255, 255};
     static const float bright[3] = {4, -1, 0.5f};
     static const char *const mtl =
-        "newmtl a\nKd 0.5\nmap_Kd -s 2 3 4 -clamp on -o 0.5 test_files.map one.png\nnewmtl b\nmap_Kd "
-        ".\\test_files.map one.png\nnewmtl c\nKd 0 0 0\nmap_Kd test_files.map.pfm\n"
-        "newmtl d\nKd 0.25\nmap_Kd test_files.map.jpg\nnewmtl e\nillum 7\nmap_Kd test_files.map.pfm\nnewmtl "
+        "newmtl a\nKd 0.5\nmap_Kd -s 2 3 4 -clamp on -o 0.5 of_files.map one.png\nnewmtl b\nmap_Kd "
+        ".\\of_files.map one.png\nnewmtl c\nKd 0 0 0\nmap_Kd of_files.map.pfm\n"
+        "newmtl d\nKd 0.25\nmap_Kd of_files.map.jpg\nnewmtl e\nillum 7\nmap_Kd of_files.map.pfm\nnewmtl "
         "f\nKd 0.5\nmap_Kd\nnewmtl g\nmap_Kd -s\n";
     pt_scene s = PT_SCENE_INIT;
     pt_obj_info info;
@@ -841,7 +841,7 @@ static void mtl_textures(void)
     write_text("map.jpg", "\xff\xd8\xff no PNG");
     write_text("tex.mtl", mtl);
     r = load(&s,
-             "mtllib test_files.tex.mtl\n" TRIANGLE
+             "mtllib of_files.tex.mtl\n" TRIANGLE
              "usemtl a\nf 1/1 2/2 3/3\nusemtl b\nf 1/1 2/2 3/3\nusemtl c\nf 1 2 3\nf 3 2 1\nusemtl d\nf 1/1 "
              "2/2 3/3\nusemtl e\nf 1 2 3\nusemtl f\nf 1 2 3\nusemtl g\nf 1 2 3\n",
              NULL, &info);
@@ -867,7 +867,7 @@ static void mtl_textures(void)
     pt_check(info.warning_count == 4 && strstr(info.warnings[0], "tex.mtl:3: option '-clamp'") &&
                  strstr(info.warnings[1], "tex.mtl:3: option '-o'") &&
                  strstr(info.warnings[2], "model.obj:13: a face with a picture has no vt") &&
-                 strstr(info.warnings[3], "tex.mtl:9: no PPM, PFM or PNG: 'test_files.map.jpg'; Kd"),
+                 strstr(info.warnings[3], "tex.mtl:9: no PPM, PFM or PNG: 'of_files.map.jpg'; Kd"),
              "options and files that are skipped", "%u: %s; %s; %s", (unsigned)info.warning_count,
              info.warnings[1], info.warnings[2], info.warnings[3]);
     pt_check(pt_commit(&s) == PT_OK && pt_scene_needs(&s) & PT_NEEDS_TEXTURES && look(&s, 0.25, 0.25, &hit),
@@ -877,7 +877,7 @@ static void mtl_textures(void)
              "pixels", "are turned");
     memset(&o, 0, sizeof o);
     o.flags = PT_OBJ_NO_TEXTURES;
-    r = load(&s, "mtllib test_files.tex.mtl\n" TRIANGLE "usemtl a\nf 1 2 3\n", &o, &info);
+    r = load(&s, "mtllib of_files.tex.mtl\n" TRIANGLE "usemtl a\nf 1 2 3\n", &o, &info);
     pt_check(r == PT_OK && s.materials[0].texture == NULL && info.textures == 0, "PT_OBJ_NO_TEXTURES",
              "there is one");
     pt_scene_free(&s);
@@ -906,14 +906,14 @@ static void relative_paths(void)
                  info.warning_count == 0,
              "beside the model", "%s", info.warnings[0]);
     pt_scene_free(&s);
-    r = load(&s, "mtllib test_files.dir\\a.mtl\n" TRIANGLE "usemtl a\nf 1/1 2/2 3/3\n", NULL, &info);
+    r = load(&s, "mtllib of_files.dir\\a.mtl\n" TRIANGLE "usemtl a\nf 1/1 2/2 3/3\n", NULL, &info);
     pt_check(r == PT_OK && info.textures == 1, "below the model, with a backslash", "%s", info.warnings[0]);
     pt_scene_free(&s);
     if (getcwd(text, 400)) {
         FILE *const file = fopen(label("%s/c.mtl", place), "wb");
         if (file) fprintf(file, "newmtl a\nmap_Kd %s/%s/a.ppm\n", text, place);
         if (file) fclose(file);
-        r = load(&s, "mtllib test_files.dir/c.mtl\n" TRIANGLE "usemtl a\nf 1/1 2/2 3/3\n", NULL, &info);
+        r = load(&s, "mtllib of_files.dir/c.mtl\n" TRIANGLE "usemtl a\nf 1/1 2/2 3/3\n", NULL, &info);
         pt_check(r == PT_OK && info.textures == 1, "an absolute path", "%s", info.warnings[0]);
     }
     pt_scene_free(&s);
@@ -938,7 +938,7 @@ static void obj_renders_the_same(void)
     pt_obj_info info;
     pt_result r;
     char text[1000];
-    size_t n = (size_t)sprintf(text, "mtllib test_files.box.mtl\nusemtl wall\n");
+    size_t n = (size_t)sprintf(text, "mtllib of_files.box.mtl\nusemtl wall\n");
     int i, k, wall, lamp;
     write_text("box.mtl", "newmtl wall\nKd 0.75 0.5 0.25\nnewmtl lamp\nKd 0 0 0\nKe 4 4 4\n");
     for (i = 0; i < 8; i++)
@@ -1619,6 +1619,7 @@ static unsigned char *film_bytes(size_t *size)
     if (picture_make(&p, 2, 1, 3, 1) && pt_render(&p.scene, &p.desc, &f, NULL) == PT_OK &&
         pti_film_need_splat(&f, 0) && pt_film_write(path_of("a.film"), &f) == PT_OK)
         data = slurp(path_of("a.film"), size);
+    remove(path_of("a.film"));
     pt_film_free(&f);
     pt_scene_free(&p.scene);
     pt_check(data != NULL, "a film file", "cannot be made");
@@ -1806,15 +1807,14 @@ static void failing_memory(void)
 {
     static char text[8000];
     static const unsigned char rgb[12] = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12};
-    size_t n = (size_t)sprintf(text, "mtllib test_files.fail.mtl\n");
+    size_t n = (size_t)sprintf(text, "mtllib of_files.fail.mtl\n");
     long k, before;
     int i, kind;
     size_t size;
     unsigned char *const film = film_bytes(&size);
     pt_scene s = PT_SCENE_INIT;
-    write_text(
-        "fail.mtl",
-        "newmtl a\nmap_Kd test_files.fail.png\nnewmtl b\nKe 1\nnewmtl c\nmap_Kd test_files.fail.png\n");
+    write_text("fail.mtl",
+               "newmtl a\nmap_Kd of_files.fail.png\nnewmtl b\nKe 1\nnewmtl c\nmap_Kd of_files.fail.png\n");
     pt_check(pt_write_png_bytes(path_of("fail.png"), rgb, 2, 2) == PT_OK, "a picture", "cannot be written");
     for (i = 0; i < 60; i++) n += (size_t)sprintf(text + n, "v %d %d 0\nvt %d 0\nvn 0 0 1\n", i, i * i, i);
     for (i = 0; i < 10; i++)
@@ -2039,7 +2039,7 @@ static const char *const OBJ_WORDS[] = {"0",
                                         "vt",
                                         "\nf ",
                                         "usemtl",
-                                        "mtllib test_files.fuzz.mtl",
+                                        "mtllib of_files.fuzz.mtl",
                                         "mtllib",
                                         "s",
                                         "o",
@@ -2049,7 +2049,7 @@ static const char *const OBJ_WORDS[] = {"0",
                                         "f 1 2 3 4 5 6 7 8",
                                         "f -1 -2 -3 -4 -5"};
 static const char OBJ_SEED[] =
-    "# a model\nmtllib test_files.fuzz.mtl\no x\nv 0 0 0\nv 1 0 0 0.5 0.5 0.5\nv 1 1 0\nv 0 1 0\nv 0.25 0.25 "
+    "# a model\nmtllib of_files.fuzz.mtl\no x\nv 0 0 0\nv 1 0 0 0.5 0.5 0.5\nv 1 1 0\nv 0 1 0\nv 0.25 0.25 "
     "0.125\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1 0\nvn 0 0 1\nvn 1e-3 -2.5e2 0.5\ng a b\nusemtl a\n"
     "f 1/1/1 2/2/1 3/3/2 4/4/1\ns 1\nusemtl b\nf 1//1 2//2 5//1\nv 5 0 0\nv 5 5 0\\\n\nv 0 5 0\nf -1 -2 -3 5 "
     "4\nusemtl c\nf 1 2 3 4 5 6 7\nl 1 2\r\nf 1/1 2/2 3/3\n";
@@ -2066,7 +2066,7 @@ static const char *const MTL_WORDS[] = {"newmtl",
                                         "Pr",
                                         "Pm",
                                         "map_Kd",
-                                        "map_Kd test_files.fuzz.png\n",
+                                        "map_Kd of_files.fuzz.png\n",
                                         "-s",
                                         "-o",
                                         "-clamp on",
@@ -2085,15 +2085,15 @@ static const char *const MTL_WORDS[] = {"newmtl",
                                         "#",
                                         "a",
                                         "b",
-                                        "test_files.fuzz.png",
+                                        "of_files.fuzz.png",
                                         "/",
                                         "\\",
                                         "\xff",
                                         "1 1 1"};
 static const char MTL_SEED[] =
     "# materials\nnewmtl a\nKd 0.5 0.25 1\nKs 0.25 0.25 0.25\nNs 30\nillum 2\nmap_Kd -s 2 2 "
-    "test_files.fuzz.png\nnewmtl b\nKa 0 0 0\nKe 3 2 1\nd 0.25\nTr 0.5\nNi 1.5\r\nTf 1 1 1\n"
-    "newmtl c\nKd 0.5\nPr 0.25\nPm 1\nmap_Kd test_files.fuzz.png\nillum 5\n";
+    "of_files.fuzz.png\nnewmtl b\nKa 0 0 0\nKe 3 2 1\nd 0.25\nTr 0.5\nNi 1.5\r\nTf 1 1 1\n"
+    "newmtl c\nKd 0.5\nPr 0.25\nPm 1\nmap_Kd of_files.fuzz.png\nillum 5\n";
 
 /* A scene from a mutant is sound: indices in range, and it can be committed and hit. */
 static int scene_is_sound(pt_scene *s)
