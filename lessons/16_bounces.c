@@ -167,7 +167,7 @@ static void picture(const setting *s, const char *output)
     film.samples[0] = 1;
     desc.camera = s->camera;
     desc.width = desc.height = SIZE;
-    desc.spp = 8;
+    desc.spp = 16;
     for (int k = 0; k < ROWS; k++) {
         desc.li.max_edges = bounces[k] + 2;
         if (pt_render(&s->scene, &desc, &one, NULL) != PT_OK) return;
