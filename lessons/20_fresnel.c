@@ -1,7 +1,7 @@
 /* Lesson 20: Snell and Fresnel
 
    QUESTION   How much light does glass reflect, how much does it let through, and in which direction?
-   IDEA       Snell: n1 sin t1 = n2 sin t2. Fresnel, for light polarised across (s), in (p) its plane of incidence, or not:
+   IDEA       Snell: n1 sin t1 = n2 sin t2. Fresnel, polarised across (s) and in (p) the plane of incidence, and not:
 
                   R_s = ((n1 cos t1 - n2 cos t2) / (n1 cos t1 + n2 cos t2))^2
                   R_p = ((n1 cos t2 - n2 cos t1) / (n1 cos t2 + n2 cos t1))^2          R = (R_s + R_p) / 2
