@@ -202,7 +202,7 @@ int main(int argc, char **argv)
     table("alpha .5, 60 deg", 0.5, 60, EX == 1 ? 0.686007250 : 0.698250697, 0.698250697, (uint32_t)n);
     if (EX != 1) table("alpha .5, sky", 0.5, -1, 0.700240477, 0.700240477, (uint32_t)n);
     table("alpha 1, above", 1, 0, 1 - log(2), 1 - log(2), (uint32_t)n);
-    printf("What to see: visible normals have the smaller standard error; perfect mirrors lose up to two thirds.\n");
+    printf("What to see: off the axis visible normals have half the standard error; mirrors lose up to two thirds.\n");
     picture(argc > 2 ? argv[2] : "22_microfacets");
     printf("lesson 22: %d passed, %d failed\n", passed, failed);
     if (!MISTAKE) return failed != 0;
