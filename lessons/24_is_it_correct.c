@@ -162,7 +162,7 @@ static void table(const pt_scene *box, const pt_camera *camera, uint32_t n)
 /* Left: three bands by the header, with the probes; right: spectra. */
 static void picture(const pt_scene *box, const pt_camera *camera, const char *output)
 {
-    enum { W = 160 };
+    enum { W = 128 };
     pt_film film = PT_FILM_INIT, one = PT_FILM_INIT;
     pt_render_desc desc = pt_render_defaults();
     char path[512];
