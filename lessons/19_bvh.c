@@ -8,7 +8,7 @@
 
               so a line enters, on average, sum over nodes of area(node) / area(S) boxes of a tree: the exact value
               below, for S a ball around everything. The surface area heuristic (SAH), by which the header builds its
-              tree, keeps this sum and the tests in leaves small; both grow as log n, not as n.
+              tree, keeps this sum and the tests in leaves small: they grow as log n at most, not as n.
               A line is between two planes for t0 <= t <= t1; it enters the box if the latest entry is <= the earliest
               exit. It must be <=: a wall parallel to an axis has a box without thickness, t0 = t1.
    BUILD      cc -O2 -I.. 19_bvh.c -o 19_bvh -lm -pthread
