@@ -15,10 +15,9 @@
               Here R = 1/2, s = 1/16, z = 2, f = 4, m = 19, sin a = 1/3; the lamp, 1 x 1 at height 2, is half hidden: V
               is 1 where it is seen, else 0. The means are not nested. One ray takes numbers for all of its decisions
               at once. Four means with 4 rays each, one inside the other, are 256 rays whose pixel was asked at 4
-              places only; 256 samples per pixel that decide all at once ask the pixel at 256 places, and the lens, and
-              the lamp. Each decision needs numbers of its own: one number used twice ties together what has nothing to
-              do with each other. Light between diffuse surfaces is still missing; found is L(D|G|S)?(G|S)*E, G for
-              glossy.
+              places only; 256 samples per pixel that decide all at once ask pixel, lens and lamp at 256 places each.
+              Each decision needs numbers of its own: one number used twice ties together what has nothing to do with
+              each other. Light between diffuse surfaces is still missing; found is L(D|G|S)?(G|S)*E, G for glossy.
 
    PICTURE    By the header's distribution ray tracing, 32 rays a pixel: the balls are in focus, the distance is not.
 
