@@ -4,8 +4,8 @@
               if the density is another one?
 
    IDEA       A warp turns numbers u, v that are uniform in [0, 1) into directions. Inversion: if P(x) is the
-              cumulative distribution, the integral of p up to x, then x = P^-1(u) has density p. For directions around
-              a normal, with density proportional to cos^n,
+              cumulative distribution, the integral of p up to x, then x = P^-1(u) has the probability density p. For
+              directions around a normal, with density proportional to cos^n,
 
                   p(w) = (n+1)/(2 pi) cos^n t per solid angle,   cos t = (1 - u)^(1/(n+1)),   phi = 2 pi v
 

@@ -56,6 +56,7 @@ parts_of() # FILE PARTS
 }
 
 wrong=
+demanding=
 for name in $lessons; do
     file=lessons/$name.c
     number=${name%%_*}
@@ -63,6 +64,7 @@ for name in $lessons; do
     case $number in
     0? | 1[0-2])
         most=220
+        demanding="$demanding $name"
         [ ! -f "lessons/img/$name.png" ] || parts=PICTURE
         [ ! -f "lessons/img/$name.svg" ] || parts="$parts PLOT"
         ;;
@@ -100,6 +102,31 @@ for name in $lessons; do
 "
 done
 none 'each lesson shows three exercises, 1 2 3' "$wrong"
+
+# The words of a list are used: in the lesson's text on the page, or in what is said there for the class.
+wrong=
+for name in $demanding; do
+    number=${name%%_*}
+    awk -v begin="<!-- lesson $number -->" '
+        $0 == begin { inside = 1; next }
+        inside && /^<!-- (lesson|more)/ { exit }
+        inside && /^\*\*/ { listed = /^\*\*Words/ }
+        inside && !listed' lessons/README.md | tr '\n' ' ' | tr 'A-Z' 'a-z' | sed 's/  */ /g; s/colour/color/g' > "$dir/text"
+    sh lessons/course.sh words_of "$name" | cut -f 1 | tr 'A-Z' 'a-z' > "$dir/words"
+    while IFS= read -r word; do
+        grep -qF -e "$word" "$dir/text" || wrong="$wrong lesson $number: $word
+"
+    done < "$dir/words"
+done
+none 'the words of a lesson are used in it' "$wrong"
+
+# shellcheck disable=SC2086
+wrong=$(sh lessons/course.sh words_of $demanding | awk -F '\t' '
+    { english = tolower($1); chinese = $2; sub(/\(.*/, "", chinese) }
+    english in other && other[english] != chinese { print english ": " other[english] ", " chinese }
+    chinese in term && term[chinese] != english { print chinese ": " term[chinese] ", " english }
+    { other[english] = chinese; term[chinese] = english }')
+none 'a word is called the same in all lessons, in both languages' "$wrong"
 
 wrong=
 for number in $(echo "$lessons" | cut -c 1-2 | sort | uniq -d); do wrong="$wrong two lessons $number"; done
