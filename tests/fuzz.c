@@ -559,6 +559,14 @@ static void films(void)
     (void)pt_film_class(&a, hostile_int(), &b);
     (void)pt_film_error_estimate(&a, &error);
     (void)pt_film_pixel(&a, 0, 0);
+#if PTI_HAS_FILES
+    if (one_in(8)) {
+        const char *const path = "build/fuzz.film";
+        (void)pt_write_ppm_as(path, &a, hostile(), (pt_ppm_kind)hostile_int());
+        if (pt_film_write(path, &a) == PT_OK) wrong += pt_film_read(path, &b) != PT_OK || b.width != a.width;
+        remove(path);
+    }
+#endif
     pt_splat_list_free(&list);
     pt_film_free(&a);
     pt_film_free(&b);
@@ -568,7 +576,7 @@ static void films(void)
 static void files(void)
 {
     static const char *const heads[6] = {"P6\n3 2\n255\n", "PF\n3 2\n-1.0\n",
-                                         "PF\n3 2\n1.0\n", "P6\n4000 4000\n255\n",
+                                         "PF\n3 2\n1.0\n", "P6\n65536 65536\n255\n",
                                          "PF\n-3 2\n0\n",  "P6 # x\n99999999999 1\n65536\n"};
     const char *const path = "build/fuzz.bin";
     unsigned char bytes[160];
@@ -589,6 +597,34 @@ static void files(void)
     else
         wrong += image.rgb != NULL;
     pt_image_free(&image);
+    remove(path);
+}
+#endif
+
+#if PTI_HAS_OBJ
+/* Small models that are in order, placed as nobody should. */
+static void models(void)
+{
+    const char *const path = "build/fuzz.obj";
+    pt_scene scene = PT_SCENE_INIT;
+    pt_obj_options options = PT_OBJ_OPTIONS_INIT;
+    pt_obj_info info;
+    pt_result result;
+    FILE *const file = fopen(path, "wb");
+    uint32_t i, k;
+    if (!file) return;
+    fprintf(file, "v %g %g %g\nv %g %g %g\nv %g 1 0\nv 0 %g 1\nvn %g %g %g\nvt %g %g\nf 1/1/1 2/1/1 3/1/1 4/1/1\nf 1 2 3\n",
+            hostile(), hostile(), hostile(), hostile(), hostile(), hostile(), hostile(), hostile(), hostile(), hostile(),
+            hostile(), hostile(), hostile());
+    fclose(file);
+    for (i = 0; i < 3; i++)
+        for (k = 0; k < 4; k++) options.transform[i][k] = one_in(3) ? hostile() : i == k;
+    options.emission_scale = one_in(2) ? hostile() : 1;
+    options.flags = below(8);
+    options.material = hostile_int();
+    result = pt_load_obj(&scene, path, &options, &info);
+    wrong += result == PT_OK ? pt_commit(&scene) != PT_OK || info.triangles != scene.triangle_count : info.error[0] == 0 || scene.triangle_count > 0;
+    pt_scene_free(&scene);
     remove(path);
 }
 #endif
@@ -619,6 +655,9 @@ static const target TARGETS[] = {{"shapes and rays", shapes, 64, 6},
                                  {"films", films, 8, 14},
 #if PTI_HAS_FILES
                                  {"image files", files, 1, 2},
+#endif
+#if PTI_HAS_OBJ
+                                 {"models", models, 4, 1},
 #endif
                                  {"scenes and pictures", scenes, 4, 60}};
 enum { TARGET_COUNT = sizeof TARGETS / sizeof TARGETS[0] };

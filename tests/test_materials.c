@@ -1005,6 +1005,33 @@ static int extreme_draws(const pt_material *m, pt_pcg32 *rng, double most)
     return bad;
 }
 
+/* One band of it is what `user` points to: negative, NaN, infinite. */
+typedef struct bad_band {
+    int band;
+    double value;
+} bad_band;
+static pt_rgb one_bad_band(void *user, pt_vec3 wo, pt_vec3 wi)
+{
+    const bad_band *const b = (const bad_band *)user;
+    (void)wo;
+    (void)wi;
+    return rgb(b->band == 0 ? b->value : 0.1, b->band == 1 ? b->value : 0.1, b->band == 2 ? b->value : 0.1);
+}
+static void refused_brdfs(void)
+{
+    static const double values[3] = {-0.1, HUGE_VAL - HUGE_VAL, HUGE_VAL};
+    int i;
+    for (i = 0; i < 9; i++) {
+        bad_band b = {0, 0};
+        pt_measured m = PT_MEASURED_INIT;
+        b.band = i % 3;
+        b.value = values[i / 3];
+        pt_check(pt_measured_fill(&m, one_bad_band, &b) == PT_ERROR_ARGUMENT && !m.value, "table of a bad BRDF",
+                 "band %d = %g was taken", b.band, b.value);
+        pt_measured_free(&m);
+    }
+}
+
 static void extremes_of_tables(void)
 {
     pt_pcg32 rng = generator(762);
@@ -1295,6 +1322,9 @@ static void table_files(void)
     if (m.value && ggx_table.value)
         pt_check(memcmp(m.value, ggx_table.value, 3 * PT_MEASURED_CELLS * sizeof(double)) == 0 && memcmp(m.cdf, ggx_table.cdf, sizeof m.cdf) == 0,
                  "a table as a file", "changes on the way");
+    allocations_left = 0;
+    pt_check(pt_measured_read(FILE_PATH, &m) == PT_ERROR_MEMORY && !m.value, "a table as a file", "is read without memory");
+    allocations_left = -1;
     patch(FILE_PATH, 12 + 8 * 777, &nan, 8);
     pt_check(pt_measured_read(FILE_PATH, &m) == PT_ERROR_FILE && !m.value, "a table with NaN", "is not refused");
     patch(FILE_PATH, 12 + 8 * 777, &infinite, 8);
@@ -1338,7 +1368,8 @@ static void tables_without_memory(void)
         r[i] = i == 0 ? pt_measured_fill(&m, coloured_lambert, NULL) : i == 1 ? pt_measured_read(ROWS_PATH, &m)
                                                                               : pt_measured_scatter(&m, nothing_scatters, NULL, 10, 45, 0);
         allocations_left = -1;
-        pt_check(r[i] == PT_ERROR_MEMORY && !m.value && allocations_alive == alive, "a table without memory",
+        /* case 1 is no table: it is refused by its size before it asks for memory */
+        pt_check(r[i] == (i == 1 ? PT_ERROR_FILE : PT_ERROR_MEMORY) && !m.value && allocations_alive == alive, "a table without memory",
                  "case %d: result %d, %ld blocks kept", i, (int)r[i], allocations_alive - alive);
     }
     pt_check(pt_measured_scatter(&m, nothing_scatters, NULL, 10, 7, 0) == PT_ERROR_ARGUMENT &&
@@ -1732,6 +1763,7 @@ int main(int argc, char **argv)
     PT_TEST_EXACT(phong_peak);
     PT_TEST_EXACT(extremes);
     PT_TEST_EXACT(extremes_of_tables);
+    PT_TEST_EXACT(refused_brdfs);
     PT_TEST_EXACT(no_gain);
     PT_TEST_EXACT(table_index);
     PT_TEST_EXACT(filled_tables);
