@@ -59,7 +59,7 @@
        [PT-09] lights
        [PT-10] scene, camera, film
        [PT-11] integrators: path tracing, Whitted, distribution, branching; light-path expressions
-       [PT-17] image files: PPM, PFM, PNG
+       [PT-17] files: pictures (PPM, PFM, PNG), films, models (OBJ with MTL)
        [PT-18] render driver: passes, threads, budgets, error against run time
        [PT-19] canonical scenes
 
@@ -73,7 +73,8 @@
        PTDEF               what stands before every public function (default: extern, or static)
        PT_NO_THREADS       one thread, no pthread
        PT_NO_STDIO         no FILE, no printing; implies PT_NO_FILES
-       PT_NO_FILES         no image writers
+       PT_NO_FILES         no files: pictures, films, tables; implies PT_NO_OBJ
+       PT_NO_OBJ           no models from OBJ files
        PT_NO_BVH           linear search instead of the tree
        PT_NO_ENVIRONMENT   no light from the background
        PT_NO_MICROFACET    no rough metal and glass, no smooth metal, no Oren-Nayar
@@ -113,6 +114,21 @@
        the same bits: a fused multiply-add rounds once where two operations round twice, and a
        compiler may fuse differently in each copy. Hits and misses of triangles do not depend on it.
 
+   LIMITS (`make stress` prints the figures, float and double side by side)
+
+       Coordinates and radii: up to PT_MAX_COORDINATE = 1e18; larger ones, infinity and NaN are refused
+       with a sentence. Hits and misses are those of exact arithmetic on the rounded input at scales
+       from 1e-45 to 1e30 and translations to 1e7, in every build.
+       Far from the origin: closed shapes are closed up to 10^6 of their own sizes away in float, 10^10 in
+       double. At 2^23 sizes a float can no longer tell the corners of a box from its middle; at
+       10^12 sizes, in double, 2 to 3 of 4,000 paths of 12 edges leave a box.
+       Solid angles: relative error below 1e-11 from 1e-12 sr to nearly 4 pi; a sphere seen from its own
+       surface 4e-8.
+       Albedo: roulette survives with at most 1 - 2^-24, so the mean is right up to that, and the
+       time of a path in a closed scene grows as 1 / (1 - albedo).
+       Radiance: 1e-9 to 1e9 in one picture to 15 digits in double, exactly in float; what a float
+       cannot hold (above 3.4e38) is infinite, counts as 0 and is reported (nonfinite).
+
    WHAT IT DOES NOT DO (today)
 
        Participating media, motion, spectra other than for making RGB values, light scattered more than
@@ -129,6 +145,7 @@
        [Coo84] Cook, Porter, Carpenter: Distributed Ray Tracing, 1984
        [Duf17] Duff et al.: Building an Orthonormal Basis, Revisited, JCGT 6(1), 2017
        [Dup23] Dupuy, Benyoub: Sampling Visible GGX Normals with Spherical Caps, 2023
+       [Gul14] Gulbrandsen: Artist Friendly Metallic Fresnel, JCGT 3(4), 2014
        [Hai19] Haines, Guenther, Akenine-Moeller: Precision Improvements for Ray/Sphere Intersection,
                Ray Tracing Gems ch. 7, 2019
        [Hei14] Heitz: Understanding the Masking-Shadowing Function, JCGT 3(2), 2014
@@ -178,6 +195,10 @@
     !defined(PT_ALLOW_FAST_MATH)
 #error "pathtracer.h: -ffast-math and its kin remove the checks for NaN and the guarantees of [PT-06]; see PT_ALLOW_FAST_MATH"
 #endif
+#if ((defined(__FLT_EVAL_METHOD__) && (__FLT_EVAL_METHOD__ < 0 || __FLT_EVAL_METHOD__ > 1)) || \
+     (defined(_M_IX86_FP) && _M_IX86_FP < 2)) && !defined(PT_ALLOW_FAST_MATH)
+#error "pathtracer.h: x87 arithmetic rounds twice, and when it does is the compiler's; -msse2 -mfpmath=sse (/arch:SSE2) does not"
+#endif
 
 /* The switches, normalised once: below this table only PTI_HAS_X is asked. */
 #ifdef PT_ONLY_PATH
@@ -216,6 +237,11 @@
 #define PTI_HAS_FILES 0
 #else
 #define PTI_HAS_FILES 1
+#endif
+#if defined(PT_NO_OBJ) || defined(PT_NO_FILES)
+#define PTI_HAS_OBJ 0
+#else
+#define PTI_HAS_OBJ 1
 #endif
 #ifdef PT_NO_BVH
 #define PTI_HAS_BVH 0
@@ -1176,6 +1202,8 @@ typedef struct pt_scene {
         parallelogram_count, delta_light_count;
     uint32_t material_capacity, position_capacity, normal_capacity, uv_capacity, triangle_capacity,
         mesh_capacity, sphere_capacity, parallelogram_capacity, delta_light_capacity;
+    void **owned;            /* blocks that live as long as the scene: the textures of loaded models       */
+    uint32_t owned_count, owned_capacity;
     pt_rgb environment;      /* constant radiance, or the mean of the image                                */
 #if PTI_HAS_ENVIRONMENT
     pt_environment_map map;  /* rgb = NULL: constant                                                       */
@@ -1523,22 +1551,38 @@ PTDEF pt_rgbd pt_li_branching(const pt_scene *scene, const pt_ray *ray, pt_sampl
 #endif
 
 /* =====================================================================================================
-   [PT-17] IMAGE FILES: declarations
+   [PT-17] FILES: declarations
    ===================================================================================================== */
 
 #if PTI_HAS_FILES
-/* Write the film's picture times `exposure` (>= 0) under `path`: to path.part first, then renamed, so that no
-   partial file ever stands there.
-   PPM: binary P6, 8 bits, sRGB transfer, clipped. PFM: linear float, rows from the bottom, little-endian.
-   PNG: 8 bits, sRGB. */
+/* All that is written goes to path.part first, is flushed, synced to the disk where the system shows how (POSIX
+   fsync, Windows _commit; nowhere with strict -std=c99 after another header), and then renamed: under `path` stands
+   what was there before or the whole new file, also when the disk is full. PT_ERROR_FILE if not; path.part is removed.
+
+   The film's picture times `exposure` (>= 0), clipped, with the sRGB transfer; PPM is binary (P6) with 8 bits, PNG
+   has 8 bits. PFM: linear float, rows from the bottom, little-endian. */
 PTDEF pt_result pt_write_ppm(const char *path, const pt_film *film, double exposure);
 PTDEF pt_result pt_write_pfm(const char *path, const pt_film *film);
 PTDEF pt_result pt_write_png(const char *path, const pt_film *film, double exposure);
+/* PPM as binary numbers (P6) or as text (P3), one pixel a line, with 8 or with 16 bits (values to 65535; in P6 the
+   more significant byte first). */
+typedef enum pt_ppm_kind { PT_PPM_P6 = 0, PT_PPM_P6_16, PT_PPM_P3, PT_PPM_P3_16 } pt_ppm_kind;
+PTDEF pt_result pt_write_ppm_as(const char *path, const pt_film *film, double exposure, pt_ppm_kind kind);
 /* The same from plain arrays: rows from the top, three bytes or three floats a pixel. What PNG needs to work
    in is allocated with user = NULL. PNG: at most 600 megapixels. */
 PTDEF pt_result pt_write_ppm_bytes(const char *path, const unsigned char *rgb, int width, int height);
 PTDEF pt_result pt_write_png_bytes(const char *path, const unsigned char *rgb, int width, int height);
 PTDEF pt_result pt_write_pfm_floats(const char *path, const float *rgb, int width, int height);
+
+/* The whole state of a film (at most 1024 classes), bit for bit: sums of both halves and of splats, albedo, normal,
+   depth, classes, counts, ranges of samples, fingerprint. A render that goes on with a film from a file ends with
+   the bits of one that was never interrupted. PT_ERROR_ARGUMENT for an empty film, and for one whose ranges do not
+   hold as many samples as it counts. */
+PTDEF pt_result pt_film_write(const char *path, const pt_film *film);
+/* Reads it; what the film held is freed first. PT_ERROR_FILE: not there, not a film, truncated or changed (a 64-bit
+   checksum covers every byte, and is asked before memory is). PT_ERROR_MISMATCH: a whole film in another version of
+   the format. Then, and without memory, the film stays empty. */
+PTDEF pt_result pt_film_read(const char *path, pt_film *film);
 
 /* A picture in memory: width * height * 3 linear values, rows from the top. Start from PT_IMAGE_INIT. */
 typedef struct pt_image {
@@ -1547,8 +1591,10 @@ typedef struct pt_image {
     int width, height;
 } pt_image;
 #define PT_IMAGE_INIT PTI_ZERO_INIT
-/* Reads a PFM (PF, either byte order) or a binary PPM (P6, 8 bits; its sRGB transfer is undone). A file that is
-   truncated, larger than 65536 pixels a side or anything else is PT_ERROR_FILE, and the image stays empty. */
+/* Reads a picture, whatever its name: PFM (PF, either byte order; linear), PPM (P6 and P3, values up to 65535) or PNG
+   (all colour types and depths, interlaced too; alpha is dropped), whose sRGB transfer is undone. A file that is
+   truncated, beyond 2 GiB, larger than 65536 pixels a side or anything else, or whose checksums (PNG) are wrong, is
+   PT_ERROR_FILE, and the image stays empty. Memory is asked for only where the size of the file bears it out. */
 PTDEF pt_result pt_read_image(const char *path, pt_image *image);
 PTDEF void pt_image_free(pt_image *image);
 
@@ -1558,6 +1604,66 @@ PTDEF void pt_image_free(pt_image *image);
 PTDEF pt_result pt_measured_write(const char *path, const pt_measured *m);
 PTDEF pt_result pt_measured_read(const char *path, pt_measured *m);
 #endif
+#endif
+
+#if PTI_HAS_OBJ
+enum {
+    PT_OBJ_MATERIAL = 1,     /* faces without a material get options.material, not a diffuse grey of 0.8   */
+    PT_OBJ_NO_MTL = 2,       /* no MTL file is read: all faces are without a material                      */
+    PT_OBJ_NO_TEXTURES = 4   /* map_Kd is ignored                                                          */
+};
+
+/* How to load a model; zero means the default. Start from PT_OBJ_OPTIONS_INIT. */
+typedef struct pt_obj_options {
+    double transform[3][4];  /* rows of (A | t): p becomes A p + t; all zero = as it is. A needs an inverse; if it
+                                mirrors, corners are reordered, so that outside stays outside              */
+    double emission_scale;   /* >= 0: multiplies Ke; 0 = 1                                                 */
+    int material;            /* see PT_OBJ_MATERIAL                                                        */
+    unsigned flags;          /* PT_OBJ_X                                                                   */
+} pt_obj_options;
+
+#define PT_OBJ_OPTIONS_INIT PTI_ZERO_INIT
+#define PT_OBJ_WARNINGS 8
+/* What was loaded, and what was not. */
+typedef struct pt_obj_info {
+    uint32_t triangles, vertices;  /* that the scene got; vertices are combinations of v, vt and vn        */
+    uint32_t emissive_triangles;
+    uint32_t materials, textures;  /* that faces use, and the scene got                                    */
+    uint32_t degenerate_faces;     /* that have no area: left out                                          */
+    uint32_t skipped_lines;        /* whose keyword means nothing here (curves, lines, other maps)         */
+    pt_vec3 lo, hi;                /* box of all triangles, transformed                                    */
+    uint32_t warning_count;        /* all of them,                                                         */
+    char warnings[PT_OBJ_WARNINGS][160]; /* and the first as sentences: "model.obj:12: ..."                */
+    char error[160];               /* why nothing was loaded; empty if all went well                       */
+} pt_obj_info;
+
+/* Adds a model from a Wavefront OBJ file, and the materials that its faces use from the MTL files that it names (paths
+   are relative to the file that names them, with / or \). options NULL: all defaults; info may be NULL. pt_commit is
+   the caller's. The scene owns the textures.
+
+   Of OBJ: v (colours and weights after it are ignored), vt, vn, f with any corners, indices from 1, or negative from
+   the latest, mtllib, usemtl. Polygons are cut into triangles in their own plane, concave ones too. Groups and smoothing
+   groups are ignored: without vn a face is flat. Of MTL: Kd, Ks, Ke, Ns, Ni, d, Tr, illum, Pr, Pm and map_Kd with its
+   option -s (others are skipped with a warning). The first line that fits says what a material becomes:
+
+       Pm >= 0.5                         metal of reflectance Kd head on, roughness Pr
+       illum 4, 6, 7, 9, or d < 0.5      glass of index Ni (1.5 without), roughness Pr: closed, clear
+       illum 3, 5 and Ks >= Kd           mirror of reflectance Ks; with Pr > 0 metal as above
+       Pr < 0.04                         diffuse Kd under a smooth coat of index Ni (1.5 without)
+       Pr                                diffuse Kd and Blinn-Phong as wide as roughness Pr, of reflectance
+                                         ((Ni - 1) / (Ni + 1))^2
+       Ks > 0, Ns > 0, illum not 0 or 1  diffuse Kd and Phong with Ks and exponent Ns (energy-conserving)
+       else                              diffuse Kd
+
+   Kd is 0.8 without a line, 1 if it is black or missing beside a map_Kd. Kd + Ks above 1 is scaled down, with a warning.
+   Ke is emitted by whatever it is, on the outside (counter-clockwise). Tf and Ka are ignored. What cannot be read of
+   materials and textures is a warning, and what stands above is used instead.
+
+   PT_ERROR_FILE: no file, more than 2 GiB, a number that is none or not finite, an index out of range, no triangle.
+   PT_ERROR_LEFT_OUT: a material needs what a PT_NO_X switch left out; pt_scene_error and info.error name it, and the
+   scene is wrong from then on. PT_ERROR_ARGUMENT: options out of range. PT_ERROR_MEMORY. After an error nothing has
+   been added. */
+PTDEF pt_result pt_load_obj(pt_scene *scene, const char *path, const pt_obj_options *options, pt_obj_info *info);
 #endif
 
 /* =====================================================================================================
@@ -1777,9 +1883,16 @@ PTDEF pt_rgb pt_cornell_rgb(const char *name);
 #define NOMINMAX
 #endif
 #include <windows.h>
-#elif PTI_HAS_THREADS
+#include <io.h>
+#elif defined(__unix__) || defined(__APPLE__)
+#if PTI_HAS_THREADS
 #include <pthread.h>
+#endif
 #include <unistd.h>
+#if defined(_GNU_SOURCE) || (defined(_POSIX_C_SOURCE) && _POSIX_C_SOURCE >= 200809L) || \
+    (!defined(_POSIX_C_SOURCE) && !defined(__STRICT_ANSI__))
+#define PTI_HAS_FSYNC 1 /* the C library shows it */
+#endif
 #endif
 
 #ifdef __cplusplus
@@ -2376,7 +2489,7 @@ static uint32_t pti_permute(uint32_t i, uint32_t n, uint64_t seed)
     mask |= mask >> 4;
     mask |= mask >> 8;
     mask |= mask >> 16;
-    for (shift = 1; (mask >> (2 * shift)) != 0; shift++) {}
+    for (shift = 1; ((uint64_t)mask >> (2 * shift)) != 0; shift++) {}
     do {
         for (round = 0; round < 4; round++) {
             uint64_t key = pt_hash64(seed + round);
@@ -2384,7 +2497,7 @@ static uint32_t pti_permute(uint32_t i, uint32_t n, uint64_t seed)
             i ^= i >> shift;
         }
     } while (i >= n);
-    return (uint32_t)((i + pt_hash64(seed + 4) % n) % n); /* a random turn makes each value equally likely */
+    return (uint32_t)((i + pt_hash64(seed + 4) % n) % n); /* in 64 bits; a random turn makes each value equally likely */
 }
 
 /* Stratum `index` of `cells` in a random order; a new order each time all are used up. */
@@ -2836,7 +2949,7 @@ PTDEF pt_result pt_estimate_mis(const pt_integral *p, const pt_technique *techni
     memset(&e, 0, sizeof e);
     for (i = 0; ok && i < count; i++) {
         ok = counts[i] >= 0 && counts[i] <= 1024;
-        all += counts[i];
+        all += ok ? counts[i] : 0;
     }
     e.techniques = techniques;
     e.counts = counts;
@@ -6405,6 +6518,12 @@ static unsigned pti_find_needs(const pt_scene *scene)
     return needs;
 }
 
+/* Frees the blocks that the scene owns, but for the first `keep`. */
+static void pti_disown(pt_scene *scene, uint32_t keep)
+{
+    while (scene->owned_count > keep) pti_free(scene->owned[--scene->owned_count], scene->alloc_user);
+}
+
 /* Frees what pt_commit made. */
 static void pti_uncommit(pt_scene *scene)
 {
@@ -6468,6 +6587,8 @@ PTDEF void pt_scene_free(pt_scene *scene)
 {
     void *user = scene->alloc_user;
     pti_uncommit(scene);
+    pti_disown(scene, 0);
+    pti_free(scene->owned, user);
     pti_free(scene->materials, user);
     pti_free(scene->positions, user);
     pti_free(scene->normals, user);
@@ -7758,11 +7879,37 @@ PTDEF pt_rgbd pt_li_branching(const pt_scene *scene, const pt_ray *ray, pt_sampl
 
 
 /* =====================================================================================================
-   [PT-17] IMAGE FILES: implementation
+   [PT-17] FILES: implementation
    =====================================================================================================
-   Every file is written under a temporary name and renamed when it is whole. */
+   Writing: every file is written under a temporary name, synced, and renamed when it is whole; a checkpoint is thus
+   the last one or the one before, never half of one.
+
+   Reading: a file is a stranger. It is read whole, or its size is known, before memory is asked for; each count is
+   compared with what is left of it, each index with what it points into, and each number with its range. Files of
+   more than 2 GiB are refused, but for films. Numbers in texts are parsed here: strtod would obey the locale.
+
+   Models: one pass over the text, in time that grows as its length does. Each combination of v, vt and vn becomes one
+   vertex, found by its hash; a material is added when a face first needs it, and a picture is read once. Only cutting a
+   polygon that is not convex takes longer than its corners are many, and is therefore limited to 1024 of them.
+
+   A film file: 64 bytes of head (see pti_film_head), the ranges of samples (first and end, 32 bits each), the sums as
+   64-bit floats in the order of pti_film_plane, and the CRC-64 of all that [ECMA 182, reflected]. Everything is
+   little-endian. A CRC finds every change within 8 consecutive bytes, and misses others once in 2^64. */
 
 #if PTI_HAS_FILES
+
+/* Hands what the system still holds of a flushed file to the disk; 0: that failed. */
+static int pti_sync(FILE *file)
+{
+#ifdef PTI_HAS_FSYNC
+    return fsync(fileno(file)) == 0;
+#elif defined(_WIN32)
+    return _commit(_fileno(file)) == 0;
+#else
+    (void)file;
+    return 1;
+#endif
+}
 
 typedef struct pti_writer {
     FILE *file;
@@ -7795,10 +7942,10 @@ static void pti_write_text(pti_writer *w, const char *text)
 /* Closes, and gives the file its name if all went well. */
 static pt_result pti_writer_close(pti_writer *w, const char *path)
 {
-    if (fflush(w->file) != 0) w->failed = 1;
+    if (fflush(w->file) != 0 || !pti_sync(w->file)) w->failed = 1;
     if (fclose(w->file) != 0) w->failed = 1;
 #if defined(_WIN32)
-    if (!w->failed && !MoveFileExA(w->temporary, path, MOVEFILE_REPLACE_EXISTING)) w->failed = 1;
+    if (!w->failed && !MoveFileExA(w->temporary, path, MOVEFILE_REPLACE_EXISTING | MOVEFILE_WRITE_THROUGH)) w->failed = 1;
 #else
     if (!w->failed && rename(w->temporary, path) != 0) w->failed = 1;
 #endif
@@ -7844,101 +7991,347 @@ PTDEF pt_result pt_write_pfm_floats(const char *path, const float *rgb, int widt
     return pti_writer_close(&w, path);
 }
 
+/* A value as a code of 0..most with the sRGB transfer, as pt_srgb_byte does it. */
+static uint32_t pti_srgb_code(double linear, double most)
+{
+    double v = linear > 0 ? (linear < 1 ? linear : 1.0) : 0.0;
+    return (uint32_t)(most * pt_srgb_encode(v) + 0.5);
+}
+
+/* One row of a film as PPM; P3: one pixel a line. Returns how many bytes of `out`, 18 a pixel at most. */
+static size_t pti_ppm_row(const pt_film *film, int y, double exposure, pt_ppm_kind kind, char *out)
+{
+    size_t row = 3 * (size_t)film->width, k, n = 0;
+    int is_long = kind == PT_PPM_P6_16 || kind == PT_PPM_P3_16;
+    for (k = 0; k < row; k++) {
+        uint32_t code = pti_srgb_code(exposure * pti_film_value(film, 2, row * (size_t)y + k), is_long ? 65535 : 255);
+        if (kind == PT_PPM_P3 || kind == PT_PPM_P3_16) {
+            out[n] = 0;
+            pti_append_integer(out + n, 8, code);
+            n += strlen(out + n);
+            out[n++] = k % 3 == 2 ? '\n' : ' ';
+        } else {
+            if (is_long) out[n++] = (char)(unsigned char)(code >> 8);
+            out[n++] = (char)(unsigned char)(code & 255u);
+        }
+    }
+    return n;
+}
+
+PTDEF pt_result pt_write_ppm_as(const char *path, const pt_film *film, double exposure, pt_ppm_kind kind)
+{
+    char head[64] = "";
+    char *row;
+    pti_writer w;
+    int y;
+    if (!film->half[0] || !(exposure >= 0) || !pti_finite(exposure) || (int)kind < 0 || kind > PT_PPM_P3_16) return PT_ERROR_ARGUMENT;
+    row = (char *)pti_alloc((size_t)film->width, 18, film->alloc_user);
+    if (!row) return PT_ERROR_MEMORY;
+    if (!pti_writer_open(&w, path)) {
+        pti_free(row, film->alloc_user);
+        return PT_ERROR_FILE;
+    }
+    pti_append(head, sizeof head, kind == PT_PPM_P6 || kind == PT_PPM_P6_16 ? "P6\n" : "P3\n");
+    pti_append_integer(head, sizeof head, (uint64_t)film->width);
+    pti_append(head, sizeof head, " ");
+    pti_append_integer(head, sizeof head, (uint64_t)film->height);
+    pti_append(head, sizeof head, kind == PT_PPM_P6_16 || kind == PT_PPM_P3_16 ? "\n65535\n" : "\n255\n");
+    pti_write_text(&w, head);
+    for (y = 0; y < film->height; y++) pti_write(&w, row, pti_ppm_row(film, y, exposure, kind, row));
+    pti_free(row, film->alloc_user);
+    return pti_writer_close(&w, path);
+}
+
+/* --- films --- */
+
+static void pti_put_little(unsigned char *to, uint64_t v, int bytes)
+{
+    int k;
+    for (k = 0; k < bytes; k++) to[k] = (unsigned char)((v >> (8 * k)) & 255u);
+}
+
+static uint64_t pti_get_little(const unsigned char *from, int bytes)
+{
+    uint64_t v = 0;
+    int k;
+    for (k = 0; k < bytes; k++) v |= (uint64_t)from[k] << (8 * k);
+    return v;
+}
+
+/* A running CRC-64: a byte at a time with a table of what each byte does. */
+typedef struct pti_crc64 {
+    uint64_t sum, table[256];
+} pti_crc64;
+
+static void pti_crc64_start(pti_crc64 *c)
+{
+    int i, k;
+    for (i = 0; i < 256; i++) {
+        uint64_t v = (uint64_t)i;
+        for (k = 0; k < 8; k++) v = (v >> 1) ^ (0xc96c5795d7870f42u & (0u - (v & 1u)));
+        c->table[i] = v;
+    }
+    c->sum = UINT64_MAX;
+}
+
+static void pti_crc64_add(pti_crc64 *c, const unsigned char *data, size_t size)
+{
+    uint64_t sum = c->sum;
+    for (; size > 0; size--) sum = c->table[(sum ^ *data++) & 255u] ^ (sum >> 8);
+    c->sum = sum;
+}
+
+enum { PTI_FILM_HEAD = 64, PTI_FILM_FORMAT = 1, PTI_FILM_PLANES = 8, PTI_FILM_CLASSES = 1024, PTI_FILM_CHUNK = 4096 };
+
+/* Where the film keeps plane i, and how many values a pixel it has. */
+static double **pti_film_plane(pt_film *film, int i, size_t *channels)
+{
+    double **planes[PTI_FILM_PLANES] = {&film->half[0], &film->half[1], &film->splat[0], &film->splat[1],
+                                        &film->albedo,  &film->normal,  &film->depth,    &film->classes};
+    *channels = i == 7 ? 3 * (size_t)film->class_count : i == 6 ? 1 : 3;
+    return planes[i];
+}
+
+/* Bit i: plane i is there. */
+static uint32_t pti_film_planes(pt_film *film)
+{
+    uint32_t planes = 0;
+    size_t channels;
+    int i;
+    for (i = 0; i < PTI_FILM_PLANES; i++)
+        if (*pti_film_plane(film, i, &channels)) planes |= 1u << i;
+    return planes;
+}
+
+/* Can there be a film with these planes: both halves, all of albedo, normal and depth or none, classes if counted? */
+static int pti_film_planes_fit(const pt_film *film, uint32_t planes)
+{
+    uint32_t aov = planes & 0x70u;
+    return (planes & 3u) == 3u && planes < 1u << PTI_FILM_PLANES && (aov == 0 || aov == 0x70u) && film->class_count >= 0 &&
+           film->class_count <= PTI_FILM_CLASSES && (planes >> 7 != 0) == (film->class_count > 0);
+}
+
+/* Are the ranges disjoint and rising, with as many samples as the film counts? Without ranges any count will do. */
+static int pti_film_ranges_fit(const pt_film *film)
+{
+    uint64_t count = 0, last = 0;
+    uint32_t i;
+    for (i = 0; i < film->range_count; i++) {
+        const pt_range r = film->ranges[i];
+        if (r.begin >= r.end || (i > 0 && r.begin <= last)) return 0;
+        count += r.end - r.begin;
+        last = r.end;
+    }
+    return film->range_count == 0 || count == (uint64_t)film->samples[0] + film->samples[1];
+}
+
+/* Bytes of the file of such a film: below 2^48, as pictures have at most 2^32 pixels. */
+static uint64_t pti_film_file_size(pt_film *film, uint32_t planes)
+{
+    uint64_t pixels = (uint64_t)film->width * (uint64_t)film->height, size = PTI_FILM_HEAD + 8 * (uint64_t)film->range_count + 8;
+    size_t channels;
+    int i;
+    for (i = 0; i < PTI_FILM_PLANES; i++) {
+        pti_film_plane(film, i, &channels);
+        if (planes >> i & 1u) size += 8 * channels * pixels;
+    }
+    return size;
+}
+
+/* The head: 8 letters, of which the line end shows a transfer as text; version of the format; then how this build
+   calls itself, for whoever looks; planes; sizes; counts; the fingerprint. */
+static void pti_film_head(pt_film *film, unsigned char *b)
+{
+    memcpy(b, "ptfilm\r\n", 8);
+    pti_put_little(b + 8, PTI_FILM_FORMAT, 4);
+    pti_put_little(b + 12, sizeof(pt_real), 4);
+    pti_put_little(b + 16, PT_VERSION_MAJOR << 16 | PT_VERSION_MINOR << 8 | PT_VERSION_PATCH, 4);
+    pti_put_little(b + 20, pti_film_planes(film), 4);
+    pti_put_little(b + 24, (uint64_t)film->width, 4);
+    pti_put_little(b + 28, (uint64_t)film->height, 4);
+    pti_put_little(b + 32, (uint64_t)film->class_count, 4);
+    pti_put_little(b + 36, film->range_count, 4);
+    pti_put_little(b + 40, film->samples[0], 4);
+    pti_put_little(b + 44, film->samples[1], 4);
+    pti_put_little(b + 48, film->fingerprint, 8);
+    pti_put_little(b + 56, film->nonfinite, 8);
+}
+
+static void pti_film_put(pti_writer *w, pti_crc64 *crc, const unsigned char *data, size_t size)
+{
+    pti_crc64_add(crc, data, size);
+    pti_write(w, data, size);
+}
+
+static void pti_film_put_doubles(pti_writer *w, pti_crc64 *crc, const double *values, size_t count)
+{
+    unsigned char chunk[PTI_FILM_CHUNK];
+    while (count > 0) {
+        size_t n = count < PTI_FILM_CHUNK / 8 ? count : (size_t)PTI_FILM_CHUNK / 8, k;
+        for (k = 0; k < n; k++) {
+            uint64_t bits;
+            memcpy(&bits, &values[k], 8);
+            pti_put_little(chunk + 8 * k, bits, 8);
+        }
+        pti_film_put(w, crc, chunk, 8 * n);
+        values += n;
+        count -= n;
+    }
+}
+
+PTDEF pt_result pt_film_write(const char *path, const pt_film *film)
+{
+    pt_film f = *film; /* the same arrays, for reading */
+    size_t pixels = (size_t)f.width * (size_t)f.height, channels;
+    unsigned char b[PTI_FILM_HEAD];
+    pti_crc64 crc;
+    pti_writer w;
+    uint32_t i;
+    int k;
+    if (!f.half[0] || !pti_film_planes_fit(&f, pti_film_planes(&f)) || !pti_film_ranges_fit(&f)) return PT_ERROR_ARGUMENT;
+    if (!pti_writer_open(&w, path)) return PT_ERROR_FILE;
+    pti_crc64_start(&crc);
+    pti_film_head(&f, b);
+    pti_film_put(&w, &crc, b, PTI_FILM_HEAD);
+    for (i = 0; i < f.range_count; i++) {
+        pti_put_little(b, f.ranges[i].begin, 4);
+        pti_put_little(b + 4, f.ranges[i].end, 4);
+        pti_film_put(&w, &crc, b, 8);
+    }
+    for (k = 0; k < PTI_FILM_PLANES; k++) {
+        const double *values = *pti_film_plane(&f, k, &channels);
+        if (values) pti_film_put_doubles(&w, &crc, values, pixels * channels);
+    }
+    pti_put_little(b, ~crc.sum, 8);
+    pti_write(&w, b, 8);
+    return pti_writer_close(&w, path);
+}
+
 /* --- reading --- */
 
-PTDEF void pt_image_free(pt_image *image)
+/* Bytes of an open file, -1 if it has no size (a pipe, say); what is read next is its first byte. */
+static int64_t pti_file_size(FILE *file)
 {
-    pti_free(image->rgb, image->alloc_user);
-    image->rgb = NULL;
-    image->width = image->height = 0;
+    int64_t size = -1;
+#if defined(_WIN32)
+    if (_fseeki64(file, 0, SEEK_END) == 0) size = _ftelli64(file);
+#else
+    if (fseek(file, 0, SEEK_END) == 0) size = (int64_t)ftell(file);
+#endif
+    rewind(file);
+    return size;
 }
 
-/* The next word of a PNM header: blanks and comments before it are skipped, one blank after it is taken. 0: none, or
-   too long. */
-static int pti_read_word(FILE *file, char *word, size_t size)
+/* Does the file end with the CRC-64 of all that stands before? */
+static int pti_film_is_whole(FILE *file, uint64_t size)
 {
-    size_t n = 0;
-    int c = fgetc(file);
-    while (c == ' ' || c == '\t' || c == '\r' || c == '\n' || c == '#') {
-        if (c == '#')
-            while (c != '\n' && c != EOF) c = fgetc(file);
-        c = fgetc(file);
+    unsigned char chunk[PTI_FILM_CHUNK];
+    pti_crc64 crc;
+    pti_crc64_start(&crc);
+    for (size -= 8; size > 0;) {
+        size_t n = size < PTI_FILM_CHUNK ? (size_t)size : (size_t)PTI_FILM_CHUNK;
+        if (fread(chunk, 1, n, file) != n) return 0;
+        pti_crc64_add(&crc, chunk, n);
+        size -= n;
     }
-    for (; c != EOF && c != ' ' && c != '\t' && c != '\r' && c != '\n'; c = fgetc(file)) {
-        if (n + 1 >= size) return 0;
-        word[n++] = (char)c;
-    }
-    word[n] = 0;
-    return n > 0;
+    return fread(chunk, 1, 8, file) == 8 && pti_get_little(chunk, 8) == ~crc.sum;
 }
 
-/* A whole number of at most 6 digits; -1: it is none. */
-static int pti_read_count(FILE *file)
+static int pti_get_doubles(FILE *file, double *values, size_t count)
 {
-    char word[8];
-    int value = 0, i;
-    if (!pti_read_word(file, word, sizeof word) || strlen(word) > 6) return -1;
-    for (i = 0; word[i]; i++) {
-        if (word[i] < '0' || word[i] > '9') return -1;
-        value = 10 * value + (word[i] - '0');
-    }
-    return value;
-}
-
-/* The pixels after the header; `kind`: 0 = bytes, 1 = floats little-endian, 2 = big-endian. */
-static int pti_read_pixels(FILE *file, pt_image *image, int kind)
-{
-    size_t row = 3 * (size_t)image->width, i;
-    int y, k;
-    for (y = 0; y < image->height; y++) {
-        float *to = image->rgb + row * (size_t)(kind ? image->height - 1 - y : y); /* PFM begins at the bottom */
-        for (i = 0; i < row; i++) {
-            unsigned char b[4];
-            uint32_t bits = 0;
-            if (fread(b, 1, kind ? 4 : 1, file) != (size_t)(kind ? 4 : 1)) return 0;
-            for (k = 0; kind && k < 4; k++) bits |= (uint32_t)b[kind == 1 ? k : 3 - k] << (8 * k);
-            if (kind) memcpy(&to[i], &bits, 4);
-            else to[i] = (float)pt_srgb_decode(b[0] / 255.0);
+    unsigned char chunk[PTI_FILM_CHUNK];
+    while (count > 0) {
+        size_t n = count < PTI_FILM_CHUNK / 8 ? count : (size_t)PTI_FILM_CHUNK / 8, k;
+        if (fread(chunk, 8, n, file) != n) return 0;
+        for (k = 0; k < n; k++) {
+            uint64_t bits = pti_get_little(chunk + 8 * k, 8);
+            memcpy(&values[k], &bits, 8);
         }
+        values += n;
+        count -= n;
     }
     return 1;
 }
 
-/* Is this the scale of a PFM: a number that is not 0? Its sign tells the byte order, its size nothing. */
-static int pti_is_scale(const char *word)
+/* An empty film with the planes, and room for the ranges, of the one that `head` tells of. */
+static pt_result pti_film_make_planes(pt_film *film, const pt_film *head, uint32_t planes)
 {
-    return strspn(word, "+-.0123456789eE") == strlen(word) && strcspn(word, "123456789") < strcspn(word, "eE");
+    pt_result result = pt_film_make(film, head->width, head->height, (planes & 0x70u) != 0);
+    int h;
+    for (h = 0; h < 2; h++)
+        if (result == PT_OK && (planes >> (2 + h) & 1u) && !pti_film_need_splat(film, h)) result = PT_ERROR_MEMORY;
+    if (result == PT_OK && head->class_count > 0) result = pt_film_make_classes(film, head->class_count);
+    if (result == PT_OK && !pti_reserve(&film->ranges, &film->range_capacity, head->range_count, sizeof *film->ranges, film->alloc_user))
+        result = PT_ERROR_MEMORY;
+    return result;
 }
 
-static pt_result pti_read_image(FILE *file, pt_image *image)
+static int pti_film_get_ranges(FILE *file, pt_film *film, uint32_t count)
 {
-    char word[32];
-    int kind = -1, width, height;
-    if (!pti_read_word(file, word, sizeof word)) return PT_ERROR_FILE;
-    if (strcmp(word, "P6") == 0) kind = 0;
-    if (strcmp(word, "PF") == 0) kind = 1;
-    width = pti_read_count(file);
-    height = pti_read_count(file);
-    if (kind < 0 || !pti_pixels_fit(width, height) || !pti_read_word(file, word, sizeof word)) return PT_ERROR_FILE;
-    if (kind == 0 && strcmp(word, "255") != 0) return PT_ERROR_FILE;
-    if (kind == 1 && !pti_is_scale(word)) return PT_ERROR_FILE;
-    if (kind == 1 && word[0] != '-') kind = 2;
-    image->rgb = (float *)pti_alloc(3 * (size_t)width * (size_t)height, sizeof *image->rgb, image->alloc_user);
-    if (!image->rgb) return PT_ERROR_MEMORY;
-    image->width = width;
-    image->height = height;
-    return pti_read_pixels(file, image, kind) ? PT_OK : PT_ERROR_FILE;
+    unsigned char b[8];
+    for (film->range_count = 0; film->range_count < count; film->range_count++) {
+        if (fread(b, 1, 8, file) != 8) return 0;
+        film->ranges[film->range_count].begin = (uint32_t)pti_get_little(b, 4);
+        film->ranges[film->range_count].end = (uint32_t)pti_get_little(b + 4, 4);
+    }
+    return pti_film_ranges_fit(film);
 }
 
-PTDEF pt_result pt_read_image(const char *path, pt_image *image)
+/* The fields of a head; 0: no film has such ones. */
+static int pti_film_parse_head(pt_film *head, const unsigned char *b, uint32_t *planes)
+{
+    memset(head, 0, sizeof *head);
+    *planes = (uint32_t)pti_get_little(b + 20, 4);
+    if (pti_get_little(b + 24, 4) > 65536 || pti_get_little(b + 28, 4) > 65536 || pti_get_little(b + 32, 4) > PTI_FILM_CLASSES) return 0;
+    head->width = (int)pti_get_little(b + 24, 4);
+    head->height = (int)pti_get_little(b + 28, 4);
+    head->class_count = (int)pti_get_little(b + 32, 4);
+    head->range_count = (uint32_t)pti_get_little(b + 36, 4);
+    head->samples[0] = (uint32_t)pti_get_little(b + 40, 4);
+    head->samples[1] = (uint32_t)pti_get_little(b + 44, 4);
+    head->fingerprint = pti_get_little(b + 48, 8);
+    head->nonfinite = pti_get_little(b + 56, 8);
+    return pti_pixels_fit(head->width, head->height) && pti_film_planes_fit(head, *planes);
+}
+
+static pt_result pti_film_read(FILE *file, pt_film *film)
+{
+    unsigned char b[PTI_FILM_HEAD];
+    int64_t size = pti_file_size(file);
+    pt_film head;
+    size_t channels;
+    uint32_t planes;
+    pt_result result;
+    int k;
+    if (size < PTI_FILM_HEAD + 8 || fread(b, 1, PTI_FILM_HEAD, file) != PTI_FILM_HEAD) return PT_ERROR_FILE;
+    if (memcmp(b, "ptfilm\r\n", 8) != 0) return PT_ERROR_FILE;
+    rewind(file);
+    if (!pti_film_is_whole(file, (uint64_t)size)) return PT_ERROR_FILE;
+    if (pti_get_little(b + 8, 4) != PTI_FILM_FORMAT) return PT_ERROR_MISMATCH;
+    if (!pti_film_parse_head(&head, b, &planes) || pti_film_file_size(&head, planes) != (uint64_t)size) return PT_ERROR_FILE;
+    result = pti_film_make_planes(film, &head, planes);
+    if (result != PT_OK) return result;
+    film->samples[0] = head.samples[0];
+    film->samples[1] = head.samples[1];
+    film->fingerprint = head.fingerprint;
+    film->nonfinite = head.nonfinite;
+    if (fseek(file, PTI_FILM_HEAD, SEEK_SET) != 0 || !pti_film_get_ranges(file, film, head.range_count)) return PT_ERROR_FILE;
+    for (k = 0; k < PTI_FILM_PLANES; k++) {
+        double *values = *pti_film_plane(film, k, &channels);
+        if (values && !pti_get_doubles(file, values, (size_t)film->width * (size_t)film->height * channels)) return PT_ERROR_FILE;
+    }
+    return PT_OK;
+}
+
+PTDEF pt_result pt_film_read(const char *path, pt_film *film)
 {
     pt_result result = PT_ERROR_FILE;
     FILE *file = path ? fopen(path, "rb") : NULL;
-    pt_image_free(image);
+    pt_film_free(film);
     if (!file) return result;
-    result = pti_read_image(file, image);
+    result = pti_film_read(file, film);
     fclose(file);
-    if (result != PT_OK) pt_image_free(image);
+    if (result != PT_OK) pt_film_free(film);
     return result;
 }
 
@@ -7967,23 +8360,17 @@ static int pti_merl_read_values(FILE *file, double *value)
 {
     unsigned char b[12];
     size_t i;
-    int k;
     if (fread(b, 1, 12, file) != 12 || memcmp(b, pti_merl_head, 12) != 0) return 0;
-    for (i = 0; i < 3 * (size_t)PT_MEASURED_CELLS; i++) {
-        uint64_t bits = 0;
-        if (fread(b, 1, 8, file) != 8) return 0;
-        for (k = 0; k < 8; k++) bits |= (uint64_t)b[k] << (8 * k);
-        memcpy(&value[i], &bits, 8);
+    if (!pti_get_doubles(file, value, 3 * (size_t)PT_MEASURED_CELLS)) return 0;
+    for (i = 0; i < 3 * (size_t)PT_MEASURED_CELLS; i++)
         if (!(fabs(value[i]) <= 1e30)) return 0; /* NaN, or no BRDF: sums and floats must hold it */
-    }
     return 1;
 }
 
 PTDEF pt_result pt_measured_read(const char *path, pt_measured *m)
 {
     FILE *file = path ? fopen(path, "rb") : NULL;
-    pt_result result = pti_merl_make(m);
-    if (!file) result = PT_ERROR_FILE;
+    pt_result result = file && pti_file_size(file) >= 12 + 24 * (int64_t)PT_MEASURED_CELLS ? pti_merl_make(m) : PT_ERROR_FILE;
     if (result == PT_OK && !pti_merl_read_values(file, m->value)) result = PT_ERROR_FILE;
     if (file) fclose(file);
     if (result == PT_OK) pti_merl_finish(m);
@@ -8072,8 +8459,15 @@ static void pti_deflate(pti_bits *b, const unsigned char *data, size_t size, siz
     if (b->count > 0) pti_put_bits(b, 0, 8 - b->count);
 }
 
-/* One row through PNG filter 4: each byte less the neighbour (left a, above p, above left c) that is nearest
-   to a + p - c (Paeth). out: the filter's number and 3 * width bytes. */
+/* The neighbour (left a, above p, above left c) that is nearest to a + p - c (Paeth). */
+static int pti_paeth(int a, int p, int c)
+{
+    int da = p > c ? p - c : c - p, dp = a > c ? a - c : c - a, dc = a + p - 2 * c;
+    if (dc < 0) dc = -dc;
+    return (da <= dp && da <= dc ? a : dp <= dc ? p : c);
+}
+
+/* One row through PNG filter 4: each byte less that neighbour. out: the filter's number and 3 * width bytes. */
 static void pti_png_row(const unsigned char *rgb, int width, int y, unsigned char *out)
 {
     size_t stride = 3 * (size_t)width, k;
@@ -8081,20 +8475,20 @@ static void pti_png_row(const unsigned char *rgb, int width, int y, unsigned cha
     out[0] = 4;
     for (k = 0; k < stride; k++) {
         int a = k < 3 ? 0 : row[k - 3], p = y == 0 ? 0 : row[k - stride], c = y == 0 || k < 3 ? 0 : row[k - stride - 3];
-        int da = p > c ? p - c : c - p, dp = a > c ? a - c : c - a, dc = a + p - 2 * c;
-        if (dc < 0) dc = -dc;
-        out[1 + k] = (unsigned char)(row[k] - (da <= dp && da <= dc ? a : dp <= dc ? p : c));
+        out[1 + k] = (unsigned char)(row[k] - pti_paeth(a, p, c));
     }
 }
 
+/* Four bits at a time: what each of the 16 does to the rest. */
 static uint32_t pti_crc32(uint32_t crc, const unsigned char *data, size_t size)
 {
+    static const uint32_t table[16] = {0x00000000, 0x1db71064, 0x3b6e20c8, 0x26d930ac, 0x76dc4190, 0x6b6b51f4, 0x4db26158, 0x5005713c,
+                                       0xedb88320, 0xf00f9344, 0xd6d6a3e8, 0xcb61b38c, 0x9b64c2b0, 0x86d3d2d4, 0xa00ae278, 0xbdbdf21c};
     size_t i;
-    int k;
     crc = ~crc;
     for (i = 0; i < size; i++) {
-        crc ^= data[i];
-        for (k = 0; k < 8; k++) crc = (crc >> 1) ^ (0xedb88320u & (0u - (crc & 1u)));
+        crc = table[(crc ^ data[i]) & 15u] ^ (crc >> 4);
+        crc = table[(crc ^ (uint32_t)data[i] >> 4) & 15u] ^ (crc >> 4);
     }
     return ~crc;
 }
@@ -8117,6 +8511,8 @@ static void pti_big_endian(unsigned char *p, uint32_t v)
     p[2] = (unsigned char)((v >> 8) & 255u);
     p[3] = (unsigned char)(v & 255u);
 }
+
+static const unsigned char pti_png_signature[8] = {137, 80, 78, 71, 13, 10, 26, 10};
 
 static void pti_png_chunk(pti_writer *w, const char *type, const unsigned char *data, size_t size)
 {
@@ -8155,7 +8551,6 @@ static int pti_png_compress(const unsigned char *rgb, int width, int height, voi
 
 static pt_result pti_write_png(const char *path, const unsigned char *rgb, int width, int height, void *user)
 {
-    static const unsigned char signature[8] = {137, 80, 78, 71, 13, 10, 26, 10};
     unsigned char header[13] = {0, 0, 0, 0, 0, 0, 0, 0, 8, 2, 0, 0, 0}; /* 8 bits, RGB */
     pti_writer w;
     pti_bits b;
@@ -8168,7 +8563,7 @@ static pt_result pti_write_png(const char *path, const unsigned char *rgb, int w
     }
     pti_big_endian(header, (uint32_t)width);
     pti_big_endian(header + 4, (uint32_t)height);
-    pti_write(&w, signature, 8);
+    pti_write(&w, pti_png_signature, 8);
     pti_png_chunk(&w, "IHDR", header, 13);
     pti_png_chunk(&w, "IDAT", b.data, b.size);
     pti_png_chunk(&w, "IEND", header, 0);
@@ -8226,6 +8621,1631 @@ PTDEF pt_result pt_write_pfm(const char *path, const pt_film *film)
     pti_free(rgb, film->alloc_user);
     return result;
 }
+
+/* --- pictures, reading --- */
+
+/* A whole file in memory, with a 0 behind it. PT_ERROR_FILE: it cannot be read; PT_ERROR_ARGUMENT: it is beyond 2 GiB. */
+static pt_result pti_read_file(const char *path, void *user, unsigned char **bytes, size_t *size)
+{
+    FILE *file = path ? fopen(path, "rb") : NULL;
+    int64_t n = file ? pti_file_size(file) : -1;
+    pt_result result = n < 0 ? PT_ERROR_FILE : n > 0x7fffffff ? PT_ERROR_ARGUMENT : PT_OK;
+    *bytes = NULL;
+    *size = result == PT_OK ? (size_t)n : 0;
+    if (result == PT_OK) {
+        *bytes = (unsigned char *)pti_alloc(*size + 1, 1, user);
+        result = *bytes ? PT_OK : PT_ERROR_MEMORY;
+    }
+    if (result == PT_OK) {
+        if (fread(*bytes, 1, *size, file) != *size) result = PT_ERROR_FILE;
+        (*bytes)[*size] = 0;
+    }
+    if (file) fclose(file);
+    if (result != PT_OK) pti_free(*bytes, user);
+    return result;
+}
+
+PTDEF void pt_image_free(pt_image *image)
+{
+    pti_free(image->rgb, image->alloc_user);
+    image->rgb = NULL;
+    image->width = image->height = 0;
+}
+
+/* Asks for the memory of a picture. */
+static pt_result pti_image_make(pt_image *image, int width, int height)
+{
+    image->rgb = (float *)pti_alloc(3 * (size_t)width * (size_t)height, sizeof *image->rgb, image->alloc_user);
+    if (!image->rgb) return PT_ERROR_MEMORY;
+    image->width = width;
+    image->height = height;
+    return PT_OK;
+}
+
+/* Codes 0..most of the sRGB curve to linear light: from a table where that is short. */
+typedef struct pti_levels {
+    uint32_t most;
+    float value[256];
+} pti_levels;
+
+static void pti_levels_make(pti_levels *l, uint32_t most)
+{
+    uint32_t i;
+    l->most = most;
+    for (i = 0; i < 256 && i <= most; i++) l->value[i] = (float)pt_srgb_decode(i / (double)most);
+}
+
+static float pti_level(const pti_levels *l, uint32_t code)
+{
+    return code < 256 ? l->value[code] : (float)pt_srgb_decode(code / (double)l->most);
+}
+
+/* What is left of a file. */
+typedef struct pti_bytes {
+    const unsigned char *at, *end;
+} pti_bytes;
+
+static int pti_next_byte(pti_bytes *b)
+{
+    return b->at < b->end ? *b->at++ : -1;
+}
+
+static int pti_is_blank(int c)
+{
+    return c == ' ' || c == '\t' || c == '\r' || c == '\n';
+}
+
+/* The next word of a PNM file: blanks and comments before it are skipped, one blank after it is taken. 0: none, or too
+   long. */
+static int pti_read_word(pti_bytes *b, char *word, size_t size)
+{
+    size_t n = 0;
+    int c = pti_next_byte(b);
+    for (; pti_is_blank(c) || c == '#'; c = pti_next_byte(b))
+        if (c == '#')
+            while (c != '\n' && c >= 0) c = pti_next_byte(b);
+    for (; c >= 0 && !pti_is_blank(c); c = pti_next_byte(b)) {
+        if (n + 1 >= size) return 0;
+        word[n++] = (char)c;
+    }
+    word[n] = 0;
+    return n > 0;
+}
+
+/* A whole number of at most 6 digits; -1: it is none. */
+static int pti_read_count(pti_bytes *b)
+{
+    char word[8];
+    int value = 0, i;
+    if (!pti_read_word(b, word, sizeof word) || strlen(word) > 6) return -1;
+    for (i = 0; word[i]; i++) {
+        if (word[i] < '0' || word[i] > '9') return -1;
+        value = 10 * value + (word[i] - '0');
+    }
+    return value;
+}
+
+/* P6 or P3 after these letters. A value has at least 1 byte, 2 as text or if it can be above 255. */
+static pt_result pti_read_ppm(pti_bytes *b, pt_image *image, int is_text)
+{
+    int width = pti_read_count(b), height = pti_read_count(b), most = pti_read_count(b), bytes = is_text || most > 255 ? 2 : 1, code = 0;
+    size_t count, k;
+    pti_levels levels;
+    pt_result result;
+    if (!pti_pixels_fit(width, height) || most < 1 || most > 65535) return PT_ERROR_FILE;
+    count = 3 * (size_t)width * (size_t)height;
+    if (((size_t)(b->end - b->at) + (size_t)is_text) / (size_t)bytes < count) return PT_ERROR_FILE;
+    result = pti_image_make(image, width, height);
+    if (result != PT_OK) return result;
+    pti_levels_make(&levels, (uint32_t)most);
+    for (k = 0; k < count; k++) {
+        if (is_text) code = pti_read_count(b);
+        else code = bytes == 1 ? b->at[k] : b->at[2 * k] << 8 | b->at[2 * k + 1];
+        if (code < 0 || code > most) return PT_ERROR_FILE;
+        image->rgb[k] = pti_level(&levels, (uint32_t)code);
+    }
+    return PT_OK;
+}
+
+/* Is this the scale of a PFM: a number that is not 0? Its sign tells the byte order, its size nothing. */
+static int pti_is_scale(const char *word)
+{
+    return strspn(word, "+-.0123456789eE") == strlen(word) && strcspn(word, "123456789") < strcspn(word, "eE");
+}
+
+/* PF after these letters. */
+static pt_result pti_read_pfm(pti_bytes *b, pt_image *image)
+{
+    char word[32];
+    int width = pti_read_count(b), height = pti_read_count(b), y, k;
+    size_t row, i;
+    pt_result result;
+    if (!pti_pixels_fit(width, height) || !pti_read_word(b, word, sizeof word) || !pti_is_scale(word)) return PT_ERROR_FILE;
+    row = 3 * (size_t)width;
+    if ((size_t)(b->end - b->at) / 4 / row < (size_t)height) return PT_ERROR_FILE;
+    result = pti_image_make(image, width, height);
+    for (y = 0; result == PT_OK && y < height; y++) {
+        float *to = image->rgb + row * (size_t)(height - 1 - y); /* PFM begins at the bottom */
+        for (i = 0; i < row; i++, b->at += 4) {
+            uint32_t bits = 0;
+            for (k = 0; k < 4; k++) bits |= (uint32_t)b->at[word[0] == '-' ? k : 3 - k] << (8 * k);
+            memcpy(&to[i], &bits, 4);
+        }
+    }
+    return result;
+}
+
+/* --- PNG, reading: any deflate stream, by canonical Huffman codes --- */
+
+/* A Huffman code as a table: the next `longest` bits are the index of symbol * 16 + length of its code; 0: no code. */
+typedef struct pti_huffman {
+    int longest;
+    uint16_t entry[32768];
+} pti_huffman;
+
+/* What is read and what is made of it. */
+typedef struct pti_inflater {
+    const unsigned char *in, *end;
+    uint64_t buffer;
+    int count, missing;     /* bits in the buffer; bytes asked for beyond the end                          */
+    unsigned char *out;
+    size_t made, size;
+    pti_huffman literal, distance;
+} pti_inflater;
+
+/* The next bits, at most 32, least significant first; beyond the end they are 0. */
+static uint32_t pti_peek_bits(pti_inflater *s, int count)
+{
+    while (s->count < count) {
+        if (s->in < s->end) s->buffer |= (uint64_t)*s->in++ << s->count;
+        else s->missing++;
+        s->count += 8;
+    }
+    return (uint32_t)(s->buffer & (((uint64_t)1 << count) - 1));
+}
+
+static uint32_t pti_take_bits(pti_inflater *s, int count)
+{
+    uint32_t bits = pti_peek_bits(s, count);
+    s->buffer >>= count;
+    s->count -= count;
+    return bits;
+}
+
+/* The table of a code from the lengths of its words [RFC 1951 3.2.2]; 0: there cannot be so many short ones. */
+static int pti_huffman_make(pti_huffman *h, const unsigned char *lengths, int symbols)
+{
+    uint32_t count[16] = {0}, next[16] = {0}, k;
+    int i, l;
+    for (i = 0; i < symbols; i++) count[lengths[i]]++;
+    count[0] = 0;
+    for (h->longest = 0, l = 1; l < 16; l++) {
+        next[l] = (next[l - 1] + count[l - 1]) << 1;
+        if (next[l] + count[l] > 1u << l) return 0;
+        if (count[l] > 0) h->longest = l;
+    }
+    memset(h->entry, 0, sizeof h->entry[0] << h->longest);
+    for (i = 0; i < symbols; i++) {
+        l = lengths[i];
+        if (l == 0) continue;
+        for (k = pti_reverse_bits(next[l]++) >> (32 - l); k < 1u << h->longest; k += 1u << l) h->entry[k] = (uint16_t)(i << 4 | l);
+    }
+    return 1;
+}
+
+/* The next symbol, -1: none has such a code. */
+static int pti_take_symbol(pti_inflater *s, const pti_huffman *h)
+{
+    int entry = h->entry[pti_peek_bits(s, h->longest)];
+    pti_take_bits(s, entry & 15);
+    return entry ? entry >> 4 : -1;
+}
+
+/* A repetition [RFC 1951 3.2.5]; see pti_put_match. */
+static int pti_inflate_match(pti_inflater *s, int code)
+{
+    int extra = code < 8 || code == 28 ? 0 : code / 4 - 1, d;
+    size_t length, distance, k;
+    length = code == 28 ? 258 : code < 8 ? (size_t)code + 3 : 3 + ((size_t)(4 + code % 4) << extra);
+    length += pti_take_bits(s, extra);
+    d = pti_take_symbol(s, &s->distance);
+    extra = d < 4 ? 0 : d / 2 - 1;
+    if (code > 28 || d < 0 || d > 29) return 0;
+    distance = d < 4 ? (size_t)d + 1 : 1 + ((size_t)(2 + d % 2) << extra);
+    distance += pti_take_bits(s, extra);
+    if (distance > s->made || length > s->size - s->made) return 0;
+    for (k = 0; k < length; k++) s->out[s->made + k] = s->out[s->made + k - distance];
+    s->made += length;
+    return 1;
+}
+
+/* The symbols of a block. Where the input has ended it ends too, as nothing but zeros follows. */
+static int pti_inflate_symbols(pti_inflater *s)
+{
+    int symbol;
+    while ((symbol = pti_take_symbol(s, &s->literal)) != 256) {
+        if (symbol < 0 || s->missing > 8) return 0;
+        if (symbol > 256) {
+            if (!pti_inflate_match(s, symbol - 257)) return 0;
+        } else {
+            if (s->made == s->size) return 0;
+            s->out[s->made++] = (unsigned char)symbol;
+        }
+    }
+    return 1;
+}
+
+static int pti_inflate_stored(pti_inflater *s)
+{
+    uint32_t length, complement;
+    pti_take_bits(s, s->count % 8);
+    length = pti_take_bits(s, 16);
+    complement = pti_take_bits(s, 16);
+    if (length != (complement ^ 0xffffu) || length > s->size - s->made) return 0;
+    for (; length > 0 && s->missing == 0; length--) s->out[s->made++] = (unsigned char)pti_take_bits(s, 8);
+    return s->missing == 0;
+}
+
+/* The codes that a block brings: the lengths of their words, themselves coded [RFC 1951 3.2.7]. */
+static int pti_inflate_codes(pti_inflater *s)
+{
+    static const unsigned char order[19] = {16, 17, 18, 0, 8, 7, 9, 6, 10, 5, 11, 4, 12, 3, 13, 2, 14, 1, 15};
+    unsigned char lengths[320] = {0};
+    int literals = (int)pti_take_bits(s, 5) + 257, distances = (int)pti_take_bits(s, 5) + 1, codes = (int)pti_take_bits(s, 4) + 4, i;
+    for (i = 0; i < codes; i++) lengths[order[i]] = (unsigned char)pti_take_bits(s, 3);
+    if (!pti_huffman_make(&s->literal, lengths, 19)) return 0;
+    memset(lengths, 0, sizeof lengths);
+    for (i = 0; i < literals + distances;) {
+        int symbol = pti_take_symbol(s, &s->literal), times = 1, value = symbol;
+        if (symbol < 0 || (symbol == 16 && i == 0)) return 0;
+        if (symbol == 16) times = 3 + (int)pti_take_bits(s, 2);
+        if (symbol == 17) times = 3 + (int)pti_take_bits(s, 3);
+        if (symbol == 18) times = 11 + (int)pti_take_bits(s, 7);
+        if (symbol >= 16) value = symbol == 16 ? lengths[i - 1] : 0;
+        if (times > literals + distances - i) return 0;
+        for (; times > 0; times--) lengths[i++] = (unsigned char)value;
+    }
+    return pti_huffman_make(&s->literal, lengths, literals) && pti_huffman_make(&s->distance, lengths + literals, distances);
+}
+
+/* The fixed codes [RFC 1951 3.2.6]. */
+static int pti_inflate_fixed(pti_inflater *s)
+{
+    unsigned char lengths[288];
+    int i;
+    for (i = 0; i < 288; i++) lengths[i] = i < 144 ? 8 : i < 256 ? 9 : i < 280 ? 7 : 8;
+    if (!pti_huffman_make(&s->literal, lengths, 288)) return 0;
+    memset(lengths, 5, 32);
+    return pti_huffman_make(&s->distance, lengths, 32);
+}
+
+/* A zlib stream [RFC 1950] that must make exactly s->size bytes with the right checksum. */
+static int pti_inflate(pti_inflater *s)
+{
+    uint32_t method = pti_take_bits(s, 8), flags = pti_take_bits(s, 8), last = 0, sum = 0;
+    int k;
+    if ((method & 15u) != 8 || method >> 4 > 7 || (method << 8 | flags) % 31 != 0 || (flags & 32u)) return 0;
+    while (!last) {
+        uint32_t kind;
+        last = pti_take_bits(s, 1);
+        kind = pti_take_bits(s, 2);
+        if (kind == 3 || (kind == 0 && !pti_inflate_stored(s))) return 0;
+        if (kind == 1 && !pti_inflate_fixed(s)) return 0;
+        if (kind == 2 && !pti_inflate_codes(s)) return 0;
+        if (kind > 0 && !pti_inflate_symbols(s)) return 0;
+    }
+    pti_take_bits(s, s->count % 8);
+    for (k = 0; k < 4; k++) sum = sum << 8 | pti_take_bits(s, 8);
+    return s->missing == 0 && s->made == s->size && sum == pti_adler32(s->out, s->size);
+}
+
+/* The head of a PNG, its palette, and its compressed data. */
+typedef struct pti_png {
+    uint32_t width, height;
+    int depth, type, channels, is_interlaced;
+    unsigned char palette[768];
+    uint32_t colours;
+    size_t size;
+} pti_png;
+
+static uint32_t pti_from_big_endian(const unsigned char *p)
+{
+    return (uint32_t)p[0] << 24 | (uint32_t)p[1] << 16 | (uint32_t)p[2] << 8 | p[3];
+}
+
+/* Colour types: 0 grey, 2 RGB, 3 palette, 4 grey and alpha, 6 RGB and alpha, each with its depths. */
+static int pti_png_head(pti_png *p, const unsigned char *d, uint32_t length)
+{
+    static const int channels[7] = {1, 0, 3, 1, 2, 0, 4};
+    if (length != 13 || p->depth != 0 || d[9] > 6 || d[10] != 0 || d[11] != 0 || d[12] > 1) return 0;
+    p->width = pti_from_big_endian(d);
+    p->height = pti_from_big_endian(d + 4);
+    p->depth = d[8];
+    p->type = d[9];
+    p->channels = channels[p->type];
+    p->is_interlaced = d[12];
+    if (p->width > 65536 || p->height > 65536 || !pti_pixels_fit((int)p->width, (int)p->height) || p->channels == 0) return 0;
+    if (p->depth == 8) return 1;
+    if (p->depth == 16) return p->type != 3;
+    return (p->depth == 1 || p->depth == 2 || p->depth == 4) && (p->type == 0 || p->type == 3);
+}
+
+/* Reads the chunks; compressed data is moved together to the beginning of the file's bytes. */
+static int pti_png_chunks(pti_png *p, unsigned char *file, size_t size)
+{
+    size_t at = 8;
+    memset(p, 0, sizeof *p);
+    for (;;) {
+        unsigned char *chunk = file + at, *d = chunk + 8;
+        uint32_t length = size - at < 12 ? UINT32_MAX : pti_from_big_endian(chunk);
+        if (length > size - at || length + 12 > size - at) return 0;
+        if (pti_crc32(0, chunk + 4, length + 4) != pti_from_big_endian(d + length)) return 0;
+        if (memcmp(chunk + 4, "IHDR", 4) == 0) {
+            if (!pti_png_head(p, d, length)) return 0;
+        } else if (p->depth == 0) {
+            return 0; /* it must be the first */
+        } else if (memcmp(chunk + 4, "PLTE", 4) == 0) {
+            if (length % 3 != 0 || length > 768 || length == 0) return 0;
+            memcpy(p->palette, d, length);
+            p->colours = length / 3;
+        } else if (memcmp(chunk + 4, "IDAT", 4) == 0) {
+            memmove(file + p->size, d, length);
+            p->size += length;
+        } else if (memcmp(chunk + 4, "IEND", 4) == 0) {
+            return 1;
+        } else if (!(chunk[4] & 32)) {
+            return 0; /* needed for display, says its first letter */
+        }
+        at += 12 + (size_t)length;
+    }
+}
+
+/* A picture of every dx-th column and dy-th row; an interlaced PNG has seven. */
+typedef struct pti_png_pass {
+    uint32_t x, y, dx, dy, width, height;
+    size_t row;              /* bytes                                                                      */
+} pti_png_pass;
+
+static pti_png_pass pti_png_pass_make(const pti_png *p, int k)
+{
+    static const unsigned char x[7] = {0, 4, 0, 2, 0, 1, 0}, dx[7] = {8, 8, 4, 4, 2, 2, 1};
+    static const unsigned char y[7] = {0, 0, 4, 0, 2, 0, 1}, dy[7] = {8, 8, 8, 4, 4, 2, 2};
+    pti_png_pass s = {0, 0, 1, 1, 0, 0, 0};
+    if (p->is_interlaced) {
+        s.x = x[k];
+        s.y = y[k];
+        s.dx = dx[k];
+        s.dy = dy[k];
+    }
+    s.width = (p->width - s.x + s.dx - 1) / s.dx; /* 0 where p->width <= x < dx: unsigned numbers wrap back */
+    s.height = s.width == 0 ? 0 : (p->height - s.y + s.dy - 1) / s.dy;
+    s.row = ((size_t)s.width * (size_t)(p->channels * p->depth) + 7) / 8;
+    return s;
+}
+
+/* Undoes the filter of a row of `size` bytes, whose number stands before it; `up` is the row above, NULL: none. */
+static int pti_png_unfilter(unsigned char *row, const unsigned char *up, size_t size, size_t pixel)
+{
+    size_t k;
+    int filter = row[-1];
+    if (filter > 4) return 0;
+    for (k = 0; k < size; k++) {
+        int a = k < pixel ? 0 : row[k - pixel], p = up ? up[k] : 0, c = up && k >= pixel ? up[k - pixel] : 0;
+        const int guess[5] = {0, a, p, (a + p) / 2, filter == 4 ? pti_paeth(a, p, c) : 0};
+        row[k] = (unsigned char)(row[k] + guess[filter]);
+    }
+    return 1;
+}
+
+/* Sample i of a row. */
+static uint32_t pti_png_sample(const unsigned char *row, size_t i, int depth)
+{
+    size_t bit = i * (size_t)depth;
+    if (depth == 16) return (uint32_t)row[2 * i] << 8 | row[2 * i + 1];
+    return ((uint32_t)row[bit / 8] >> (8 - depth - (int)(bit % 8))) & ((1u << depth) - 1);
+}
+
+/* Linear light of pixel i of a row; 0: beyond the palette. */
+static int pti_png_pixel(const pti_png *p, const pti_levels *levels, const unsigned char *row, size_t i, float *to)
+{
+    uint32_t v;
+    int k;
+    for (k = 0; k < 3; k++) {
+        v = pti_png_sample(row, i * (size_t)p->channels + (size_t)(p->channels >= 3 ? k : 0), p->depth);
+        if (p->type == 3 && v >= p->colours) return 0;
+        to[k] = pti_level(levels, p->type == 3 ? p->palette[3 * v + (uint32_t)k] : v);
+    }
+    return 1;
+}
+
+static int pti_png_picture(const pti_png *p, unsigned char *raw, pt_image *image)
+{
+    size_t pixel = (size_t)(p->channels * p->depth + 7) / 8;
+    pti_levels levels;
+    uint32_t x, y;
+    int k;
+    pti_levels_make(&levels, p->type == 3 ? 255 : (1u << p->depth) - 1);
+    for (k = 0; k < (p->is_interlaced ? 7 : 1); k++) {
+        pti_png_pass s = pti_png_pass_make(p, k);
+        for (y = 0; y < s.height; y++, raw += s.row + 1) {
+            float *to = image->rgb + 3 * ((size_t)(s.y + y * s.dy) * p->width + s.x);
+            if (!pti_png_unfilter(raw + 1, y > 0 ? raw - s.row : NULL, s.row, pixel)) return 0;
+            for (x = 0; x < s.width; x++)
+                if (!pti_png_pixel(p, &levels, raw + 1, x, to + 3 * (size_t)x * s.dx)) return 0;
+        }
+    }
+    return 1;
+}
+
+/* Inflates and decodes; the picture's own memory is asked for last, when all checksums are right. No deflate stream is
+   longer than 1032 times its bytes: 258 for 2 bits. */
+static pt_result pti_read_png(unsigned char *file, size_t size, pt_image *image)
+{
+    pt_result result = PT_ERROR_FILE;
+    pti_inflater *s;
+    uint64_t raw = 0;
+    pti_png p;
+    int k;
+    if (!pti_png_chunks(&p, file, size)) return PT_ERROR_FILE;
+    for (k = 0; k < (p.is_interlaced ? 7 : 1); k++) {
+        pti_png_pass pass = pti_png_pass_make(&p, k);
+        raw += ((uint64_t)pass.row + 1) * pass.height;
+    }
+    if (raw / 1032 > p.size || raw > SIZE_MAX) return PT_ERROR_FILE;
+    s = (pti_inflater *)pti_alloc_zero(1, sizeof *s, image->alloc_user);
+    if (!s) return PT_ERROR_MEMORY;
+    s->in = file;
+    s->end = file + p.size;
+    s->size = (size_t)raw;
+    s->out = (unsigned char *)pti_alloc(s->size, 1, image->alloc_user);
+    if (!s->out) result = PT_ERROR_MEMORY;
+    else if (pti_inflate(s)) result = pti_image_make(image, (int)p.width, (int)p.height);
+    if (result == PT_OK && !pti_png_picture(&p, s->out, image)) result = PT_ERROR_FILE;
+    pti_free(s->out, image->alloc_user);
+    pti_free(s, image->alloc_user);
+    return result;
+}
+
+PTDEF pt_result pt_read_image(const char *path, pt_image *image)
+{
+    unsigned char *file;
+    char word[8];
+    size_t size;
+    pti_bytes b;
+    pt_result result;
+    pt_image_free(image);
+    result = pti_read_file(path, image->alloc_user, &file, &size);
+    if (result != PT_OK) return result == PT_ERROR_MEMORY ? result : PT_ERROR_FILE;
+    b.at = file;
+    b.end = file + size;
+    result = PT_ERROR_FILE;
+    if (size >= 8 && memcmp(file, pti_png_signature, 8) == 0) result = pti_read_png(file, size, image);
+    else if (!pti_read_word(&b, word, sizeof word)) result = PT_ERROR_FILE;
+    else if (strcmp(word, "P6") == 0 || strcmp(word, "P3") == 0) result = pti_read_ppm(&b, image, word[1] == '3');
+    else if (strcmp(word, "PF") == 0) result = pti_read_pfm(&b, image);
+    pti_free(file, image->alloc_user);
+    if (result != PT_OK) pt_image_free(image);
+    return result;
+}
+
+#if PTI_HAS_OBJ
+/* --- models: OBJ and MTL --- */
+
+/* Where in a text the reading is. A 0 ends the text; \n, \r or both end a line, unless a \ stands before. */
+typedef struct pti_text {
+    const char *at;
+    uint32_t line;
+} pti_text;
+
+static int pti_is_line_end(int c)
+{
+    return c == '\n' || c == '\r' || c == 0;
+}
+
+/* Goes over blanks; 0: the line ends here. */
+static int pti_skip_blanks(pti_text *t)
+{
+    for (;; t->at++) {
+        if (t->at[0] == '\\' && t->at[1] != 0 && pti_is_line_end(t->at[1])) {
+            t->at += t->at[1] == '\r' && t->at[2] == '\n' ? 2 : 1;
+            t->line++;
+        } else if (*t->at != ' ' && *t->at != '\t') {
+            return !pti_is_line_end(*t->at);
+        }
+    }
+}
+
+static int pti_word_ends(const char *p)
+{
+    return *p == ' ' || *p == '\t' || pti_is_line_end(*p) || (p[0] == '\\' && pti_is_line_end(p[1]));
+}
+
+/* The next word of the line, and its length; 0: there is none. */
+static size_t pti_take_word(pti_text *t, const char **word)
+{
+    pti_skip_blanks(t);
+    for (*word = t->at; !pti_word_ends(t->at);) t->at++;
+    return (size_t)(t->at - *word);
+}
+
+static int pti_word_is(const char *word, size_t size, const char *text)
+{
+    return strlen(text) == size && memcmp(word, text, size) == 0;
+}
+
+/* The rest of the line without the blanks around it: names may have blanks. */
+static size_t pti_take_rest(pti_text *t, const char **rest)
+{
+    size_t n;
+    pti_skip_blanks(t);
+    *rest = t->at;
+    n = strcspn(t->at, "\r\n");
+    t->at += n;
+    while (n > 0 && pti_is_blank((*rest)[n - 1])) n--;
+    return n;
+}
+
+static void pti_next_line(pti_text *t)
+{
+    while (pti_skip_blanks(t)) t->at++;
+    if (*t->at) t->at += t->at[0] == '\r' && t->at[1] == '\n' ? 2 : 1;
+    t->line++;
+}
+
+/* m 10^e. Both m < 2^53 and 10^22 are exact doubles, so that for |e| <= 22 the one operation rounds correctly. Beyond
+   are at most 20 roundings: relative error below 2^-48 where the result is not subnormal. */
+static double pti_scale_10(uint64_t m, int64_t e)
+{
+    static const double ten[23] = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,  1e8,  1e9,  1e10, 1e11,
+                                   1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
+    double x = (double)m;
+    e = e < -400 ? -400 : e > 400 ? 400 : e; /* m < 10^19: 0 or infinite long before */
+    for (; e > 22; e -= 22) x *= 1e22;
+    for (; e < -22; e += 22) x /= 1e22;
+    return e < 0 ? x / ten[-e] : x * ten[e];
+}
+
+/* A decimal number, in every locale with a point; goes behind it. Digits after the 19th count as zeros. 0: there is
+   none. */
+static int pti_take_number(const char **at, double *value)
+{
+    const char *p = *at;
+    int minus = *p == '-', digits = 0, fraction = 0, less;
+    int64_t e = 0, more = 0;
+    uint64_t m = 0;
+    if (*p == '-' || *p == '+') p++;
+    for (; (*p >= '0' && *p <= '9') || (*p == '.' && !fraction); p++) {
+        if (*p == '.') {
+            fraction = 1;
+        } else if (m < 1000000000000000000u) {
+            m = 10 * m + (uint64_t)(*p - '0');
+            e -= fraction;
+            digits = 1;
+        } else {
+            e += !fraction;
+        }
+    }
+    if (!digits) return 0;
+    if ((*p == 'e' || *p == 'E') && (p[1] == '-' || p[1] == '+' ? (p[2] >= '0' && p[2] <= '9') : (p[1] >= '0' && p[1] <= '9'))) {
+        less = p[1] == '-';
+        for (p += p[1] == '-' || p[1] == '+' ? 2 : 1; *p >= '0' && *p <= '9'; p++)
+            if (more < 1000000000) more = 10 * more + (*p - '0');
+        e += less ? -more : more;
+    }
+    *at = p;
+    *value = minus ? -pti_scale_10(m, e) : pti_scale_10(m, e);
+    return 1;
+}
+
+/* Up to `most` numbers of the line; how many, or -1: a word is no number. */
+static int pti_take_numbers(pti_text *t, double *values, int most)
+{
+    int n = 0;
+    while (n < most && pti_skip_blanks(t) && *t->at != '#')
+        if (!pti_take_number(&t->at, &values[n++]) || !pti_word_ends(t->at)) return -1;
+    return n;
+}
+
+/* A hash table of numbers of things that are kept elsewhere. */
+typedef struct pti_slot {
+    uint32_t hash, id;      /* id + 1; 0: free                                                             */
+} pti_slot;
+typedef struct pti_table {
+    pti_slot *slots;
+    size_t capacity;        /* a power of two, at least twice the count                                    */
+    size_t count;
+} pti_table;
+
+/* Makes room for one more; 0: no memory. */
+static int pti_table_reserve(pti_table *t, void *user)
+{
+    pti_table more;
+    size_t i, at;
+    if (2 * (t->count + 1) <= t->capacity) return 1;
+    more.count = t->count;
+    more.capacity = t->capacity > 0 ? 2 * t->capacity : 64;
+    more.slots = (pti_slot *)pti_alloc_zero(more.capacity, sizeof *more.slots, user);
+    if (!more.slots) return 0;
+    for (i = 0; i < t->capacity; i++) {
+        if (t->slots[i].id == 0) continue;
+        for (at = t->slots[i].hash & (more.capacity - 1); more.slots[at].id != 0;) at = (at + 1) & (more.capacity - 1);
+        more.slots[at] = t->slots[i];
+    }
+    pti_free(t->slots, user);
+    *t = more;
+    return 1;
+}
+
+/* The slot of the thing that `same` finds equal to the key, or the free one where it belongs. */
+static pti_slot *pti_table_find(const pti_table *t, uint32_t hash, int (*same)(const void *key, uint32_t id), const void *key)
+{
+    size_t at = hash & (t->capacity - 1);
+    while (t->slots[at].id != 0 && !(t->slots[at].hash == hash && same(key, t->slots[at].id - 1))) at = (at + 1) & (t->capacity - 1);
+    return &t->slots[at];
+}
+
+#define PTI_NONE UINT32_MAX
+
+/* A corner of a face: indices of v, vt, vn; PTI_NONE: without. */
+typedef struct pti_corner {
+    uint32_t v, vt, vn;
+} pti_corner;
+
+/* What a newmtl says; texts are places in the pool of the loader, 0: none. */
+typedef struct pti_mtl {
+    double kd[3], ks[3], ke[3], ns, ni, d, pr, pm, tr, illum, scale[2];
+    unsigned given;          /* bits in the order of pti_mtl_keys                                          */
+    uint32_t name, file, line, map;
+    int id;                  /* in the scene, -1: not yet                                                  */
+} pti_mtl;
+
+enum { PTI_MTL_KD = 1, PTI_MTL_NI = 16, PTI_MTL_D = 32, PTI_MTL_PR = 64, PTI_MTL_PM = 128, PTI_MTL_ILLUM = 512 };
+
+/* Its numbers, and the range that they are kept in: that of pt_material, of the format (Ni), or what fits a float. */
+static const struct {
+    char key[6];
+    unsigned char count;
+    unsigned short offset;
+    double lo, hi;
+} pti_mtl_keys[10] = {{"Kd", 3, offsetof(pti_mtl, kd), 0, 1},     {"Ks", 3, offsetof(pti_mtl, ks), 0, 1},
+                      {"Ke", 3, offsetof(pti_mtl, ke), 0, 1e30},  {"Ns", 1, offsetof(pti_mtl, ns), 0, 1e6},
+                      {"Ni", 1, offsetof(pti_mtl, ni), 0.001, 10}, {"d", 1, offsetof(pti_mtl, d), 0, 1},
+                      {"Pr", 1, offsetof(pti_mtl, pr), 0, 1},     {"Pm", 1, offsetof(pti_mtl, pm), 0, 1},
+                      {"Tr", 1, offsetof(pti_mtl, tr), 0, 1},     {"illum", 1, offsetof(pti_mtl, illum), 0, 10}};
+
+/* A picture and its path in the pool. */
+typedef struct pti_picture {
+    uint32_t path;
+    pt_image image;
+} pti_picture;
+
+enum { PTI_TOLD_SCALED = 1, PTI_TOLD_NO_VT = 2, PTI_TOLD_SKIPPED = 4 };
+
+/* A loader. */
+typedef struct pti_obj {
+    pt_scene *scene;
+    pt_obj_options options;
+    pt_obj_info *info;
+    pt_result result;
+    const char *file;        /* what is being read, and where                                              */
+    pti_text text;
+    double cofactor[3][3];   /* for normals: the inverse transposed, times a positive factor               */
+    int mirrors;
+    pt_vec3 *v, *vn;
+    pt_vec2 *vt;
+    pti_corner *corners;     /* the vertices of the mesh: each combination once                            */
+    pti_corner *face;        /* the corners of the current one                                             */
+    pti_mtl *mtls;
+    char *pool;
+    uint32_t v_count, vn_count, vt_count, corner_count, face_count, mtl_count, pool_count;
+    uint32_t v_capacity, vn_capacity, vt_capacity, corner_capacity, face_capacity, mtl_capacity, pool_capacity;
+    pti_table corner_table, name_table;
+    uint32_t library;        /* the MTL file that was read last                                            */
+    int across, upward;      /* the axes on which the current face is looked at                            */
+    int mesh[4];             /* of the scene, for triangles without and with vn (2) and vt (1); -1: none   */
+    int mesh_count;
+    int material;            /* of mtls, for the faces to come, -1: none                                   */
+    int plain;               /* of the scene, for faces without, -1: not yet                               */
+    unsigned told;           /* PTI_TOLD_X: what is said once                                              */
+#if PTI_HAS_TEXTURES
+    pti_picture *pictures;   /* that were read, owned by the scene                                         */
+    uint32_t picture_count, picture_capacity;
+#endif
+} pti_obj;
+
+/* "<file>:<line>: <what>'<name>'<end>"; a name is cut at 60 bytes, and what is no letter is shown as '?'. */
+static void pti_obj_say(const pti_obj *o, char *text, const char *what, const char *name, size_t size, const char *end)
+{
+    const size_t room = sizeof o->info->error;
+    const char *file = o->file, *p;
+    char letters[64] = "'";
+    size_t n = 1;
+    for (p = file; *p; p++)
+        if (*p == '/' || *p == '\\') file = p + 1;
+    text[0] = 0;
+    pti_append(text, 64, file);
+    if (o->text.line > 0) {
+        pti_append(text, room, ":");
+        pti_append_integer(text, room, o->text.line);
+    }
+    pti_append(text, room, ": ");
+    pti_append(text, room, what);
+    for (; n <= size && n < 61; n++) letters[n] = (char)((unsigned char)name[n - 1] < 32 || name[n - 1] == 127 ? '?' : name[n - 1]);
+    letters[n] = '\'';
+    if (size > 0) pti_append(text, room, letters);
+    pti_append(text, room, end);
+}
+
+static void pti_obj_warn_of(pti_obj *o, const char *what, const char *name, size_t size, const char *end)
+{
+    uint32_t n = o->info->warning_count++;
+    if (n < PT_OBJ_WARNINGS) pti_obj_say(o, o->info->warnings[n], what, name, size, end);
+}
+
+static void pti_obj_warn(pti_obj *o, const char *what)
+{
+    pti_obj_warn_of(o, what, "", 0, "");
+}
+
+/* A warning that is given once however often it is due. */
+static void pti_obj_tell_of(pti_obj *o, unsigned told, const char *name, size_t size, const char *end)
+{
+    if (!(o->told & told)) pti_obj_warn_of(o, "", name, size, end);
+    o->told |= told;
+}
+
+/* Ends the loading; returns 0. */
+static int pti_obj_fail_of(pti_obj *o, pt_result result, const char *what, const char *name, size_t size, const char *end)
+{
+    o->result = result;
+    pti_obj_say(o, o->info->error, what, name, size, end);
+    return 0;
+}
+
+static int pti_obj_fail(pti_obj *o, pt_result result, const char *what)
+{
+    return pti_obj_fail_of(o, result, what, "", 0, "");
+}
+
+static int pti_obj_no_memory(pti_obj *o)
+{
+    return pti_obj_fail(o, PT_ERROR_MEMORY, "out of memory");
+}
+
+/* Appends one element to an array of the loader, or fails. */
+#define PTI_OBJ_PUSH(o, array, number, capacity, value) \
+    (pti_reserve(&(o)->array, &(o)->capacity, (size_t)(o)->number + 1, sizeof *(o)->array, (o)->scene->alloc_user) \
+         ? ((o)->array[(o)->number++] = (value), 1) \
+         : pti_obj_no_memory(o))
+
+/* Keeps a text; where it stands in the pool, 0: no memory. */
+static uint32_t pti_obj_keep(pti_obj *o, const char *text, size_t size)
+{
+    uint32_t at = o->pool_count > 0 ? o->pool_count : 1;
+    if (!pti_reserve(&o->pool, &o->pool_capacity, (size_t)at + size + 1, 1, o->scene->alloc_user)) {
+        pti_obj_no_memory(o);
+        return 0;
+    }
+    memcpy(o->pool + at, text, size);
+    o->pool[at + size] = 0;
+    o->pool_count = (uint32_t)(at + size + 1);
+    return at;
+}
+
+/* Keeps the path of a file that the current one names: beside it unless the name is absolute. */
+static uint32_t pti_obj_path(pti_obj *o, const char *name, size_t size)
+{
+    size_t n = strlen(o->file);
+    uint32_t at, i;
+    while (n > 0 && o->file[n - 1] != '/' && o->file[n - 1] != '\\') n--;
+    if (size > 2 && name[0] == '.' && (name[1] == '/' || name[1] == '\\')) {
+        name += 2;
+        size -= 2;
+    }
+    if (name[0] == '/' || name[0] == '\\' || (size > 1 && name[1] == ':')) n = 0;
+    at = pti_obj_keep(o, o->file, n);
+    if (at > 0) o->pool_count--; /* goes on behind */
+    if (at == 0 || !pti_obj_keep(o, name, size)) return 0;
+    for (i = at + (uint32_t)n; o->pool[i]; i++)
+        if (o->pool[i] == '\\') o->pool[i] = '/';
+    return at;
+}
+
+/* Opens a text in place of the current one. */
+static pt_result pti_obj_open(pti_obj *o, const char *path, unsigned char **bytes)
+{
+    size_t size;
+    pt_result result = pti_read_file(path, o->scene->alloc_user, bytes, &size);
+    if (result == PT_OK && memchr(*bytes, 0, size)) {
+        pti_free(*bytes, o->scene->alloc_user);
+        result = PT_ERROR_SCENE; /* no text */
+    }
+    if (result != PT_OK) return result;
+    o->file = path;
+    o->text.at = (const char *)*bytes;
+    if (strncmp(o->text.at, "\xef\xbb\xbf", 3) == 0) o->text.at += 3; /* a byte order mark */
+    o->text.line = 1;
+    return PT_OK;
+}
+
+/* --- MTL --- */
+
+typedef struct pti_name_key {
+    const pti_obj *o;
+    const char *name;
+    size_t size;
+} pti_name_key;
+
+static int pti_same_name(const void *key, uint32_t id)
+{
+    const pti_name_key *k = (const pti_name_key *)key;
+    return pti_word_is(k->name, k->size, k->o->pool + k->o->mtls[id].name);
+}
+
+/* The slot of a material's name; NULL: no memory. */
+static pti_slot *pti_obj_name(pti_obj *o, const char *name, size_t size, uint32_t *hash)
+{
+    const pti_name_key key = {o, name, size};
+    uint64_t h = size;
+    size_t i;
+    for (i = 0; i < size; i++) h = pt_hash64(h ^ (uint64_t)(unsigned char)name[i]);
+    *hash = (uint32_t)h;
+    if (!pti_table_reserve(&o->name_table, o->scene->alloc_user)) return NULL;
+    return pti_table_find(&o->name_table, *hash, pti_same_name, &key);
+}
+
+/* newmtl: a material of that name; if there is one already, that stays. */
+static int pti_mtl_begin(pti_obj *o)
+{
+    const char *name;
+    size_t size = pti_take_rest(&o->text, &name);
+    uint32_t hash;
+    pti_slot *slot;
+    pti_mtl m;
+    memset(&m, 0, sizeof m);
+    m.id = -1;
+    m.d = m.scale[0] = m.scale[1] = 1;
+    m.line = o->text.line;
+    m.name = pti_obj_keep(o, name, size);
+    if (m.name > 0) m.file = pti_obj_keep(o, o->file, strlen(o->file));
+    if (m.file == 0 || !PTI_OBJ_PUSH(o, mtls, mtl_count, mtl_capacity, m)) return 0;
+    slot = pti_obj_name(o, name, size, &hash);
+    if (!slot) return pti_obj_no_memory(o);
+    if (slot->id != 0) return 1;
+    slot->hash = hash;
+    slot->id = o->mtl_count;
+    o->name_table.count++;
+    return 1;
+}
+
+/* A line of numbers. Outside their range they are moved into it; only Ni is then as if it were not there. */
+static void pti_mtl_number(pti_obj *o, pti_mtl *m, int key)
+{
+    const char *name = pti_mtl_keys[key].key;
+    double v[3], *to = (double *)(void *)((char *)m + pti_mtl_keys[key].offset);
+    double lo = pti_mtl_keys[key].lo, hi = pti_mtl_keys[key].hi;
+    int count = pti_mtl_keys[key].count, n = pti_take_numbers(&o->text, v, count), k, outside = 0;
+    if (n != 1 && n != count) {
+        pti_obj_warn_of(o, "", name, strlen(name), " without its numbers is ignored");
+        return;
+    }
+    for (k = 0; k < count; k++) {
+        to[k] = v[n == 1 ? 0 : k];
+        outside |= !(to[k] >= lo && to[k] <= hi);
+        to[k] = to[k] > lo ? (to[k] < hi ? to[k] : hi) : lo;
+    }
+    if (outside) pti_obj_warn_of(o, "", name, strlen(name), " is out of range");
+    if (!(outside && 1 << key == PTI_MTL_NI)) m->given |= 1u << key;
+}
+
+/* map_Kd: options, then a name. -s u v is how often the picture is repeated; the others are skipped. */
+static int pti_mtl_map(pti_obj *o, pti_mtl *m)
+{
+    static const char *const options[12] = {"-s",      "-o",      "-t",  "-mm",     "-bm",      "-clamp",
+                                            "-blendu", "-blendv", "-cc", "-texres", "-imfchan", "-boost"};
+    const char *word;
+    size_t size;
+    for (;;) {
+        pti_text before = o->text;
+        double v[3] = {1, 1, 1}, unused;
+        int k, n = 0;
+        size = pti_take_word(&o->text, &word);
+        for (k = 0; k < 12 && !pti_word_is(word, size, options[k]);) k++;
+        if (k == 12) {
+            o->text = before;
+            break;
+        }
+        for (; n < 3 && pti_skip_blanks(&o->text); n++) { /* its numbers, or one word */
+            before = o->text;
+            if (pti_take_number(&before.at, k == 0 ? &v[n] : &unused) && pti_word_ends(before.at)) o->text = before;
+            else break;
+        }
+        if (n == 0) pti_take_word(&o->text, &before.at);
+        if (k > 0) pti_obj_warn_of(o, "option ", word, size, " of map_Kd is skipped");
+        for (n = 0; k == 0 && n < 2; n++) m->scale[n] = fabs(v[n]) <= 1e6 ? v[n] : 1;
+    }
+    size = pti_take_rest(&o->text, &word);
+    m->map = size > 0 ? pti_obj_path(o, word, size) : 0;
+    return o->result == PT_OK;
+}
+
+static int pti_mtl_line(pti_obj *o)
+{
+    const char *word;
+    size_t size = pti_take_word(&o->text, &word);
+    pti_mtl *m = o->mtl_count > 0 ? &o->mtls[o->mtl_count - 1] : NULL;
+    int k;
+    if (size == 0 || *word == '#') {
+        o->text.at += strcspn(o->text.at, "\r\n"); /* a comment does not go on */
+        return 1;
+    }
+    if (pti_word_is(word, size, "newmtl")) return pti_mtl_begin(o);
+    if (m && pti_word_is(word, size, "map_Kd")) return pti_mtl_map(o, m);
+    for (k = 0; m && k < 10; k++)
+        if (pti_word_is(word, size, pti_mtl_keys[k].key)) {
+            pti_mtl_number(o, m, k);
+            return 1;
+        }
+    if (!pti_word_is(word, size, "Ka") && !pti_word_is(word, size, "Tf")) o->info->skipped_lines++;
+    return 1;
+}
+
+/* Reads an MTL file; 0: it cannot be read, or memory ended. */
+static int pti_mtl_read(pti_obj *o, const char *name, size_t size)
+{
+    const char *file = o->file;
+    pti_text text = o->text;
+    unsigned char *bytes;
+    char *path;
+    pt_result result;
+    uint32_t at = pti_obj_path(o, name, size);
+    if (at == 0) return 0;
+    if (o->library > 0 && strcmp(o->pool + at, o->pool + o->library) == 0) return 1;
+    path = (char *)pti_alloc(strlen(o->pool + at) + 1, 1, o->scene->alloc_user); /* the pool moves as it grows */
+    if (!path) return pti_obj_no_memory(o);
+    memcpy(path, o->pool + at, strlen(o->pool + at) + 1);
+    result = pti_obj_open(o, path, &bytes);
+    if (result == PT_OK) {
+        uint32_t first = o->mtl_count;
+        o->library = at;
+        for (; *o->text.at && o->result == PT_OK; pti_next_line(&o->text))
+            if (!pti_mtl_line(o)) break;
+        if (first == o->mtl_count) pti_obj_warn(o, "no newmtl in it");
+        pti_free(bytes, o->scene->alloc_user);
+    }
+    pti_free(path, o->scene->alloc_user);
+    o->file = file;
+    o->text = text;
+    if (result == PT_ERROR_MEMORY) pti_obj_no_memory(o);
+    return result == PT_OK && o->result == PT_OK;
+}
+
+/* mtllib: one name that may have blanks, or several that have none. */
+static int pti_obj_libraries(pti_obj *o)
+{
+    pti_text line = o->text;
+    const char *name;
+    size_t size = pti_take_rest(&o->text, &name);
+    if ((o->options.flags & PT_OBJ_NO_MTL) || (size > 0 && pti_mtl_read(o, name, size))) return 1;
+    o->text = line;
+    while (o->result == PT_OK && (size = pti_take_word(&o->text, &name)) > 0)
+        if (!pti_mtl_read(o, name, size) && o->result == PT_OK) pti_obj_warn_of(o, "cannot read ", name, size, "");
+    return o->result == PT_OK;
+}
+
+/* --- materials --- */
+
+static pt_rgb pti_mtl_rgb(const double *v, double factor)
+{
+    return pt_rgb3((pt_real)(v[0] * factor), (pt_real)(v[1] * factor), (pt_real)(v[2] * factor));
+}
+
+static double pti_mtl_max(const double *v)
+{
+    return fmax(v[0], fmax(v[1], v[2]));
+}
+
+/* A metal of given reflectance r head on. Of all n - i k with that r the one of smallest n, for which n^2 + k^2 = 1, has
+   a reflectance that only rises towards grazing angles [Gul14]. r is kept 2^-20 below 1, as n must not be 0. */
+static pt_material pti_mtl_metal(const double *reflectance, double roughness)
+{
+    pt_material m = pti_material_of_kind(PT_MATERIAL_CONDUCTOR, pt_rgb_grey(1));
+    double n[3], k[3];
+    int i;
+    for (i = 0; i < 3; i++) {
+        double r = fmin(reflectance[i], 1 - 9.5367431640625e-7);
+        n[i] = (1 - r) / (1 + r);
+        k[i] = 2 * sqrt(r) / (1 + r);
+    }
+    m.eta = pti_mtl_rgb(n, 1);
+    m.k = pti_mtl_rgb(k, 1);
+    m.roughness = (pt_real)roughness;
+    return m;
+}
+
+/* Diffuse and glossy; together they reflect at most 1. */
+static pt_material pti_mtl_glossy(pti_obj *o, const pti_mtl *s, pt_material_kind kind, const double *kd, const double *ks, double exponent)
+{
+    pt_material m = pti_material_of_kind(kind, pt_rgb_grey(0));
+    double most = 1;
+    int k;
+    for (k = 0; k < 3; k++) most = fmax(most, kd[k] + ks[k]);
+    if (most > 1)
+        pti_obj_tell_of(o, PTI_TOLD_SCALED, o->pool + s->name, strlen(o->pool + s->name),
+                        ": diffuse and specular exceed 1 and are scaled down, here and elsewhere");
+    m.albedo = pti_mtl_rgb(kd, 1 / most);
+    m.specular = pti_mtl_rgb(ks, 1 / most);
+    m.exponent = (pt_real)exponent;
+    return m;
+}
+
+/* Kd as it is used: white beside a picture that it would blacken. */
+static void pti_mtl_diffuse(const pti_mtl *s, double *kd)
+{
+    int k, white = s->map > 0 && (!(s->given & PTI_MTL_KD) || pti_mtl_max(s->kd) == 0);
+    for (k = 0; k < 3; k++) kd[k] = white ? 1 : s->given & PTI_MTL_KD ? s->kd[k] : 0.8;
+}
+
+/* The table above pt_load_obj. GGX of roughness Pr has alpha = Pr^2, about as wide as a Blinn-Phong lobe of exponent
+   2 / alpha^2 - 2 [Wal07]; that would be above 1e6 for Pr < 0.04. */
+static pt_material pti_mtl_surface(pti_obj *o, const pti_mtl *s)
+{
+    double kd[3], ks[3], d = s->given & PTI_MTL_D ? s->d : 1 - s->tr, pr = s->given & PTI_MTL_PR ? s->pr : 0;
+    double ior = s->given & PTI_MTL_NI ? s->ni : 1.5, f0 = (ior - 1) / (ior + 1);
+    int illum = s->given & PTI_MTL_ILLUM ? (int)s->illum : 2;
+    pt_material m;
+    pti_mtl_diffuse(s, kd);
+    if (s->given & PTI_MTL_PM && s->pm >= 0.5) {
+        m = pti_mtl_metal(kd, pr);
+    } else if (illum == 4 || illum == 6 || illum == 7 || illum == 9 || d < 0.5) {
+        m = pt_material_dielectric((pt_real)ior);
+        m.roughness = (pt_real)pr;
+    } else if ((illum == 3 || illum == 5) && pti_mtl_max(s->ks) > 0 && pti_mtl_max(s->ks) >= pti_mtl_max(kd)) {
+        m = pr > 0 ? pti_mtl_metal(s->ks, pr) : pt_material_mirror(pti_mtl_rgb(s->ks, 1));
+    } else if (s->given & PTI_MTL_PR && pr < 0.04) {
+        m = pti_material_of_kind(PT_MATERIAL_COAT, pti_mtl_rgb(kd, 1));
+        m.ior = (pt_real)fmax(ior, 1.001);
+    } else if (s->given & PTI_MTL_PR) {
+        ks[0] = ks[1] = ks[2] = f0 * f0;
+        m = pti_mtl_glossy(o, s, PT_MATERIAL_BLINN, kd, ks, 2 / (pr * pr * pr * pr) - 2);
+    } else if (pti_mtl_max(s->ks) > 0 && s->ns > 0 && illum > 1) {
+        m = pti_mtl_glossy(o, s, PT_MATERIAL_PHONG, kd, s->ks, s->ns);
+    } else {
+        m = pt_material_diffuse(pti_mtl_rgb(kd, 1));
+    }
+    return m;
+}
+
+#if PTI_HAS_TEXTURES
+/* Gives a block to the scene; 0: no memory, the block is freed. */
+static int pti_scene_own(pt_scene *scene, void *block)
+{
+    void *user = scene->alloc_user;
+    int ok = block && pti_reserve(&scene->owned, &scene->owned_capacity, (size_t)scene->owned_count + 1, sizeof *scene->owned, user);
+    if (ok) scene->owned[scene->owned_count++] = block;
+    else pti_free(block, user);
+    return ok;
+}
+
+/* The picture of a path, read once; NULL: it cannot be read (a warning), or no memory. */
+static const pt_image *pti_obj_picture(pti_obj *o, uint32_t path)
+{
+    const char *name = o->pool + path;
+    pti_picture p;
+    size_t i;
+    pt_result result;
+    for (i = 0; i < o->picture_count; i++)
+        if (strcmp(o->pool + o->pictures[i].path, name) == 0) return &o->pictures[i].image;
+    memset(&p, 0, sizeof p);
+    p.path = path;
+    p.image.alloc_user = o->scene->alloc_user;
+    result = pt_read_image(name, &p.image);
+    if (result == PT_ERROR_FILE) {
+        const char *last = strrchr(name, '/') ? strrchr(name, '/') + 1 : name;
+        pti_obj_warn_of(o, "no PPM, PFM or PNG: ", last, strlen(last), "; Kd alone is used");
+    }
+    if (result == PT_ERROR_MEMORY) pti_obj_no_memory(o);
+    if (result != PT_OK) return NULL;
+    for (i = 0; i < 3 * (size_t)p.image.width * (size_t)p.image.height; i++) { /* a reflectance; a PFM may hold anything */
+        float v = p.image.rgb[i];
+        p.image.rgb[i] = v > 0 ? (v < 1 ? v : 1) : 0;
+    }
+    if (!pti_scene_own(o->scene, p.image.rgb)) {
+        pti_obj_no_memory(o);
+        return NULL;
+    }
+    if (!PTI_OBJ_PUSH(o, pictures, picture_count, picture_capacity, p)) return NULL;
+    o->info->textures++;
+    return &o->pictures[o->picture_count - 1].image;
+}
+#endif
+
+/* Lets the picture of map_Kd multiply the albedo; what does not come from Kd goes without. */
+static int pti_obj_texture(pti_obj *o, const pti_mtl *s, pt_material *m)
+{
+    int wanted = s->map > 0 && !(o->options.flags & PT_OBJ_NO_TEXTURES) && m->kind != PT_MATERIAL_DIELECTRIC && m->kind != PT_MATERIAL_MIRROR;
+#if PTI_HAS_TEXTURES
+    const pt_image *image;
+    pt_texture *t;
+    if (!wanted) return 1;
+    image = pti_obj_picture(o, s->map);
+    if (!image) return o->result == PT_OK;
+    t = (pt_texture *)pti_alloc_zero(1, sizeof *t, o->scene->alloc_user);
+    if (!pti_scene_own(o->scene, t)) return pti_obj_no_memory(o);
+    t->rgb = image->rgb;
+    t->width = image->width;
+    t->height = image->height;
+    t->scale = pt_v2((pt_real)s->scale[0], (pt_real)s->scale[1]);
+    m->texture = t;
+#else
+    if (wanted)
+        pti_scene_fail(o->scene, PT_ERROR_LEFT_OUT, "material", o->scene->material_count, "textures were left out: PT_NO_TEXTURES");
+#endif
+    return 1;
+}
+
+/* Adds a material to the scene; its id, -1: the loading has ended. */
+static int pti_obj_add_material(pti_obj *o, pt_material m)
+{
+    int id = o->scene->error == PT_OK ? pt_add_material(o->scene, m) : -1;
+    if (id >= 0) o->info->materials++;
+    else pti_obj_fail(o, o->scene->error, pt_scene_error(o->scene));
+    return id;
+}
+
+/* The scene's material of a newmtl, added when a face first needs it. Sentences name its line. */
+static int pti_obj_mtl_id(pti_obj *o, pti_mtl *s)
+{
+    const char *file = o->file;
+    pti_text text = o->text;
+    pt_material m;
+    double scale = o->options.emission_scale > 0 ? o->options.emission_scale : 1, ke[3];
+    int k;
+    if (s->id >= 0) return s->id;
+    o->file = o->pool + s->file;
+    o->text.line = s->line;
+    for (k = 0; k < 3; k++) ke[k] = fmin(s->ke[k] * scale, pti_mtl_keys[2].hi);
+    m = pti_mtl_surface(o, s);
+    m.emission = pti_mtl_rgb(ke, 1);
+    if (pti_obj_texture(o, s, &m)) s->id = pti_obj_add_material(o, m);
+    o->file = file;
+    o->text = text;
+    return s->id;
+}
+
+static int pti_obj_material(pti_obj *o)
+{
+    if (o->material >= 0) return pti_obj_mtl_id(o, &o->mtls[o->material]);
+    if (o->plain < 0) o->plain = pti_obj_add_material(o, pt_material_diffuse(pt_rgb_grey(PTI_R(0.8))));
+    return o->plain;
+}
+
+static int pti_obj_use(pti_obj *o)
+{
+    const char *name;
+    size_t size = pti_take_rest(&o->text, &name);
+    uint32_t hash;
+    const pti_slot *slot;
+    if (o->options.flags & PT_OBJ_NO_MTL) return 1;
+    slot = pti_obj_name(o, name, size, &hash);
+    if (!slot) return pti_obj_no_memory(o);
+    o->material = (int)slot->id - 1;
+    if (slot->id == 0) pti_obj_warn_of(o, "no newmtl ", name, size, "");
+    return 1;
+}
+
+/* --- vertices and faces --- */
+
+static int pti_obj_position(pti_obj *o)
+{
+    double p[3], q[3], bad;
+    const double (*a)[4] = (const double (*)[4])o->options.transform;
+    pt_vec3 v;
+    int k;
+    if (pti_take_numbers(&o->text, p, 3) != 3) return pti_obj_fail(o, PT_ERROR_FILE, "'v' without three numbers");
+    for (k = 0; k < 3; k++) {
+        q[k] = a[k][0] * p[0] + a[k][1] * p[1] + a[k][2] * p[2] + a[k][3];
+        if (!(fabs(q[k]) <= PT_MAX_COORDINATE)) return pti_obj_fail(o, PT_ERROR_FILE, "a coordinate beyond 1e18");
+    }
+    v = pt_v3((pt_real)q[0], (pt_real)q[1], (pt_real)q[2]);
+    if (pti_coordinate_bad(v, &bad)) return pti_obj_fail(o, PT_ERROR_FILE, "a coordinate beyond 1e18");
+    return PTI_OBJ_PUSH(o, v, v_count, v_capacity, v);
+}
+
+/* A normal that is none is kept as 0. */
+static int pti_obj_normal(pti_obj *o)
+{
+    const double (*c)[3] = (const double (*)[3])o->cofactor;
+    double v[3];
+    pti_d3 n = pti_d(0, 0, 0);
+    if (pti_take_numbers(&o->text, v, 3) == 3)
+        n = pti_d_normalize(pti_d(c[0][0] * v[0] + c[0][1] * v[1] + c[0][2] * v[2], c[1][0] * v[0] + c[1][1] * v[1] + c[1][2] * v[2],
+                                  c[2][0] * v[0] + c[2][1] * v[1] + c[2][2] * v[2]));
+    if (!(pti_d_dot(n, n) > 0.5)) {
+        pti_obj_warn(o, "a normal that is 0 or no number: faces with it are flat");
+        n = pti_d(0, 0, 0);
+    }
+    return PTI_OBJ_PUSH(o, vn, vn_count, vn_capacity, pti_d_to(n));
+}
+
+static int pti_obj_uv(pti_obj *o)
+{
+    double v[2] = {0, 0};
+    if (pti_take_numbers(&o->text, v, 2) < 1 || !(fabs(v[0]) <= PT_MAX_COORDINATE && fabs(v[1]) <= PT_MAX_COORDINATE)) {
+        pti_obj_warn(o, "'vt' that is no number or beyond 1e18 is taken as 0");
+        v[0] = v[1] = 0;
+    }
+    return PTI_OBJ_PUSH(o, vt, vt_count, vt_capacity, pt_v2((pt_real)v[0], (pt_real)v[1]));
+}
+
+/* An index: from 1, or negative from the latest; 0: the loading has ended. */
+static int pti_obj_index(pti_obj *o, uint32_t count, uint32_t *index)
+{
+    const char *p = o->text.at, *word = p;
+    int minus = *p == '-';
+    uint64_t i = 0;
+    for (p += minus; *p >= '0' && *p <= '9'; p++)
+        if (i < 10000000000u) i = 10 * i + (uint64_t)(*p - '0');
+    if (i == 0 || i > count) return pti_obj_fail_of(o, PT_ERROR_FILE, "index ", word, strcspn(word, " \t\r\n"), " points nowhere");
+    o->text.at = p;
+    *index = (uint32_t)(minus ? count - i : i - 1);
+    return 1;
+}
+
+/* v, v/vt, v//vn or v/vt/vn */
+static int pti_obj_corner(pti_obj *o)
+{
+    const char *word = o->text.at;
+    pti_corner c = {PTI_NONE, PTI_NONE, PTI_NONE};
+    if (!pti_obj_index(o, o->v_count, &c.v)) return 0;
+    if (*o->text.at == '/') {
+        o->text.at++;
+        if (*o->text.at != '/' && !pti_word_ends(o->text.at) && !pti_obj_index(o, o->vt_count, &c.vt)) return 0;
+    }
+    if (*o->text.at == '/') {
+        o->text.at++;
+        if (!pti_word_ends(o->text.at) && !pti_obj_index(o, o->vn_count, &c.vn)) return 0;
+    }
+    if (!pti_word_ends(o->text.at)) return pti_obj_fail_of(o, PT_ERROR_FILE, "no corner of a face: ", word, strcspn(word, " \t\r\n"), "");
+    return PTI_OBJ_PUSH(o, face, face_count, face_capacity, c);
+}
+
+typedef struct pti_corner_key {
+    const pti_corner *corners;
+    pti_corner corner;
+} pti_corner_key;
+
+static int pti_same_corner(const void *key, uint32_t id)
+{
+    const pti_corner_key *k = (const pti_corner_key *)key;
+    return memcmp(&k->corners[id], &k->corner, sizeof k->corner) == 0;
+}
+
+/* The vertex of a corner; PTI_NONE: no memory. */
+static uint32_t pti_obj_vertex(pti_obj *o, const pti_corner *c)
+{
+    const pti_corner_key key = {o->corners, *c};
+    uint32_t hash = (uint32_t)pt_hash64(pt_hash64((uint64_t)c->v << 32 | c->vt) ^ c->vn);
+    pti_slot *slot;
+    if (!pti_table_reserve(&o->corner_table, o->scene->alloc_user)) {
+        pti_obj_no_memory(o);
+        return PTI_NONE;
+    }
+    slot = pti_table_find(&o->corner_table, hash, pti_same_corner, &key);
+    if (slot->id == 0) {
+        if (!PTI_OBJ_PUSH(o, corners, corner_count, corner_capacity, *c)) return PTI_NONE;
+        slot->hash = hash;
+        slot->id = o->corner_count;
+        o->corner_table.count++;
+    }
+    return slot->id - 1;
+}
+
+/* Widens the box. */
+static void pti_obj_widen(pt_obj_info *info, pt_vec3 p)
+{
+    const pt_vec3 lo = info->lo, hi = info->hi;
+    info->lo = pt_v3(p.x < lo.x ? p.x : lo.x, p.y < lo.y ? p.y : lo.y, p.z < lo.z ? p.z : lo.z);
+    info->hi = pt_v3(p.x > hi.x ? p.x : hi.x, p.y > hi.y ? p.y : hi.y, p.z > hi.z ? p.z : hi.z);
+}
+
+/* Adds the triangle of three corners of the face, if it has an area. Its vertices are counted from those that the scene
+   gets in the end. */
+static int pti_obj_triangle(pti_obj *o, uint32_t i, uint32_t j, uint32_t k, int material)
+{
+    const uint32_t corner[3] = {i, o->mirrors ? k : j, o->mirrors ? j : k};
+    const pti_corner *f = o->face;
+    pt_scene *scene = o->scene;
+    pt_triangle t;
+    int n, *mesh = &o->mesh[(f->vn != PTI_NONE ? 2 : 0) + (f->vt != PTI_NONE ? 1 : 0)];
+    if (!pti_triangle_has_area(o->v[f[i].v], o->v[f[j].v], o->v[f[k].v])) return 1;
+    if (*mesh < 0) *mesh = (int)scene->mesh_count + o->mesh_count++;
+    t.material = material;
+    t.mesh = *mesh;
+    if (o->info->triangles == 0) o->info->lo = o->info->hi = o->v[f[i].v];
+    for (n = 0; n < 3; n++) {
+        t.v[n] = pti_obj_vertex(o, &f[corner[n]]);
+        if (t.v[n] == PTI_NONE) return 0;
+        t.v[n] += scene->position_count;
+        pti_obj_widen(o->info, o->v[f[corner[n]].v]);
+    }
+    if (!pti_reserve(&scene->triangles, &scene->triangle_capacity, (size_t)scene->triangle_count + 1, sizeof t, scene->alloc_user))
+        return pti_obj_no_memory(o);
+    scene->triangles[scene->triangle_count++] = t;
+    o->info->triangles++;
+    if (!pti_rgb_black(scene->materials[material].emission)) o->info->emissive_triangles++;
+    return 1;
+}
+
+static double pti_obj_along(const pti_obj *o, uint32_t corner, int axis)
+{
+    const pt_vec3 *p = &o->v[o->face[corner].v];
+    return (double)(axis == 0 ? p->x : axis == 1 ? p->y : p->z);
+}
+
+/* Twice the area of three corners as the face is looked at: positive if they turn to the left. */
+static double pti_obj_turn(const pti_obj *o, uint32_t a, uint32_t b, uint32_t c)
+{
+    double x = pti_obj_along(o, a, o->across), y = pti_obj_along(o, a, o->upward);
+    return (pti_obj_along(o, b, o->across) - x) * (pti_obj_along(o, c, o->upward) - y) -
+           (pti_obj_along(o, b, o->upward) - y) * (pti_obj_along(o, c, o->across) - x);
+}
+
+/* Looks at the face along the axis that is nearest to its normal (the sum of the areas of a fan), from outside. */
+static void pti_obj_look(pti_obj *o)
+{
+    double area[3] = {0, 0, 0};
+    uint32_t i;
+    int k, best = 0;
+    for (k = 0; k < 3; k++) {
+        o->across = (k + 1) % 3;
+        o->upward = (k + 2) % 3;
+        for (i = 1; i + 1 < o->face_count; i++) area[k] += pti_obj_turn(o, 0, i, i + 1);
+        if (fabs(area[k]) > fabs(area[best])) best = k;
+    }
+    o->across = (best + (area[best] < 0 ? 2 : 1)) % 3;
+    o->upward = (best + (area[best] < 0 ? 1 : 2)) % 3;
+}
+
+static int pti_same_point(pt_vec3 a, pt_vec3 b)
+{
+    return a.x == b.x && a.y == b.y && a.z == b.z;
+}
+
+/* Does nothing of the polygon lie in the triangle at its i-th corner, which turns to the left? Corners that lie on those
+   of the triangle do not count: a hole is often tied to its rim by a double edge. */
+static int pti_obj_is_ear(const pti_obj *o, const uint32_t *ring, uint32_t n, uint32_t i, uint32_t *work)
+{
+    uint32_t a = ring[(i + n - 1) % n], b = ring[i], c = ring[(i + 1) % n], k;
+    if (!(pti_obj_turn(o, a, b, c) > 0)) return 0;
+    for (k = 0; k < n; k++) {
+        const pti_corner *f = o->face;
+        const pt_vec3 *v = o->v, d = v[f[ring[k]].v];
+        *work += 1;
+        if (pti_obj_turn(o, a, b, ring[k]) < 0 || pti_obj_turn(o, b, c, ring[k]) < 0 || pti_obj_turn(o, c, a, ring[k]) < 0) continue;
+        if (!pti_same_point(d, v[f[a].v]) && !pti_same_point(d, v[f[b].v]) && !pti_same_point(d, v[f[c].v])) return 0;
+    }
+    return 1;
+}
+
+/* A polygon of more corners is cut as a fan if it is not convex; so is what is left after that much work. */
+enum { PTI_EARS_MAX = 1024, PTI_EARS_WORK = 1 << 24 };
+
+/* Cuts off one ear after the other: a simple polygon has two. A corner on a straight line is none yet, so that no edge
+   is left with a corner of a neighbour in its middle. */
+static int pti_obj_cut(pti_obj *o, int material)
+{
+    uint32_t ring[PTI_EARS_MAX], n = o->face_count, i, failed = 0, work = 0, ears;
+    int ok = 1;
+    for (i = 0; i < n; i++) ring[i] = i;
+    for (i = 1; ok && n > 3 && failed < n && work < PTI_EARS_WORK;) {
+        if (pti_obj_is_ear(o, ring, n, i, &work)) {
+            ok = pti_obj_triangle(o, ring[(i + n - 1) % n], ring[i], ring[(i + 1) % n], material);
+            memmove(ring + i, ring + i + 1, (n - i - 1) * sizeof *ring);
+            i = i < --n ? i : 0;
+            failed = 0;
+        } else {
+            i = (i + 1) % n;
+            failed++;
+        }
+    }
+    ears = o->info->triangles;
+    for (i = 1; ok && i + 1 < n; i++) ok = pti_obj_triangle(o, ring[0], ring[i], ring[i + 1], material);
+    if (n > 3 && o->info->triangles > ears) pti_obj_warn(o, "a polygon that crosses itself: some of it is cut as a fan");
+    return ok;
+}
+
+static int pti_obj_polygon(pti_obj *o, int material)
+{
+    uint32_t n = o->face_count, i;
+    int convex = 1;
+    if (n > 3) pti_obj_look(o);
+    for (i = 0; convex && n > 3 && i < n; i++) convex = pti_obj_turn(o, i, (i + 1) % n, (i + 2) % n) > 0;
+    if (!convex && n <= PTI_EARS_MAX) return pti_obj_cut(o, material);
+    if (!convex) pti_obj_warn(o, "a polygon of more than 1024 corners that is not convex is cut as a fan");
+    for (i = 1; i + 1 < n; i++)
+        if (!pti_obj_triangle(o, 0, i, i + 1, material)) return 0;
+    return 1;
+}
+
+static int pti_obj_face(pti_obj *o)
+{
+    uint32_t before = o->info->triangles, i;
+    int material, has_vt = 1, has_vn = 1;
+    o->face_count = 0;
+    while (pti_skip_blanks(&o->text) && *o->text.at != '#')
+        if (!pti_obj_corner(o)) return 0;
+    for (i = 0; i < o->face_count; i++) {
+        const pti_corner *c = &o->face[i];
+        has_vt &= c->vt != PTI_NONE;
+        has_vn = has_vn && c->vn != PTI_NONE && pt_v3_dot(o->vn[c->vn], o->vn[c->vn]) > 0;
+    }
+    for (i = 0; i < o->face_count; i++) {
+        if (!has_vt) o->face[i].vt = PTI_NONE;
+        if (!has_vn) o->face[i].vn = PTI_NONE;
+    }
+    material = pti_obj_material(o);
+    if (material < 0 || !pti_obj_polygon(o, material)) return 0;
+#if PTI_HAS_TEXTURES
+    if (!has_vt && o->scene->materials[material].texture)
+        pti_obj_tell_of(o, PTI_TOLD_NO_VT, "", 0, "a face with a picture has no vt, here and elsewhere: each triangle shows its corner");
+#endif
+    if (o->info->triangles == before) o->info->degenerate_faces++;
+    return 1;
+}
+
+/* --- the whole --- */
+
+static int pti_obj_line(pti_obj *o)
+{
+    const char *word;
+    size_t size = pti_take_word(&o->text, &word);
+    if (size == 0 || *word == '#') {
+        o->text.at += strcspn(o->text.at, "\r\n"); /* a comment does not go on */
+        return 1;
+    }
+    if (pti_word_is(word, size, "v")) return pti_obj_position(o);
+    if (pti_word_is(word, size, "f")) return pti_obj_face(o);
+    if (pti_word_is(word, size, "vn")) return pti_obj_normal(o);
+    if (pti_word_is(word, size, "vt")) return pti_obj_uv(o);
+    if (pti_word_is(word, size, "usemtl")) return pti_obj_use(o);
+    if (pti_word_is(word, size, "mtllib")) return pti_obj_libraries(o);
+    if (pti_word_is(word, size, "g") || pti_word_is(word, size, "o") || pti_word_is(word, size, "s")) return 1;
+    pti_obj_tell_of(o, PTI_TOLD_SKIPPED, word, size, " is skipped, and what else is no face");
+    o->info->skipped_lines++;
+    return 1;
+}
+
+static int pti_obj_read(pti_obj *o, const char *path)
+{
+    unsigned char *bytes;
+    pt_result result;
+    o->file = path ? path : "";
+    result = pti_obj_open(o, path, &bytes);
+    if (result == PT_ERROR_MEMORY) return pti_obj_no_memory(o);
+    if (result == PT_ERROR_ARGUMENT) return pti_obj_fail(o, PT_ERROR_FILE, "is larger than 2 GiB");
+    if (result == PT_ERROR_SCENE) return pti_obj_fail(o, PT_ERROR_FILE, "is not a text");
+    if (result != PT_OK) return pti_obj_fail(o, PT_ERROR_FILE, "cannot be read");
+    for (; *o->text.at && o->result == PT_OK; pti_next_line(&o->text))
+        if (!pti_obj_line(o)) break;
+    pti_free(bytes, o->scene->alloc_user);
+    if (o->result == PT_OK && o->info->triangles == 0) {
+        o->text.line = 0;
+        pti_obj_fail(o, PT_ERROR_FILE, "holds no triangle with an area");
+    }
+    return o->result == PT_OK;
+}
+
+/* The transform and what follows from it. */
+static int pti_obj_prepare(pti_obj *o)
+{
+    double (*a)[4] = o->options.transform, zero = 0, det = 0;
+    int i, k;
+    for (i = 0; i < 3; i++)
+        for (k = 0; k < 4; k++) zero = fmax(zero, a[i][k] == 0 ? 0 : 1); /* NaN too is not 0 */
+    for (i = 0; zero == 0 && i < 3; i++) a[i][i] = 1;
+    for (i = 0; i < 3; i++)
+        for (k = 0; k < 3; k++) {
+            const double *b = a[(i + 1) % 3], *c = a[(i + 2) % 3];
+            o->cofactor[i][k] = b[(k + 1) % 3] * c[(k + 2) % 3] - b[(k + 2) % 3] * c[(k + 1) % 3];
+        }
+    for (k = 0; k < 3; k++) det += a[0][k] * o->cofactor[0][k];
+    if (det == 0 || !pti_finite(det) || !pti_finite(a[0][3] + a[1][3] + a[2][3]))
+        return pti_obj_fail(o, PT_ERROR_ARGUMENT, "the transform is not finite or has no inverse");
+    o->mirrors = det < 0;
+    for (i = 0; o->mirrors && i < 3; i++)
+        for (k = 0; k < 3; k++) o->cofactor[i][k] = -o->cofactor[i][k];
+    if (!(o->options.emission_scale >= 0) || !pti_finite(o->options.emission_scale))
+        return pti_obj_fail(o, PT_ERROR_ARGUMENT, "the scale of the emission is negative or not finite");
+    if (!(o->options.flags & PT_OBJ_MATERIAL)) return 1;
+    o->plain = o->options.material;
+    if (o->plain >= 0 && (uint32_t)o->plain < o->scene->material_count) return 1;
+    return pti_obj_fail(o, PT_ERROR_ARGUMENT, "the material of the options does not exist");
+}
+
+/* Gives the vertices to the scene, for which all memory is asked first. Those without vt or vn have 0 there, and no
+   triangle that looks. */
+static int pti_obj_finish(pti_obj *o)
+{
+    pt_scene *s = o->scene;
+    void *user = s->alloc_user;
+    int has_vn = o->mesh[2] >= 0 || o->mesh[3] >= 0, has_vt = o->mesh[1] >= 0 || o->mesh[3] >= 0, k;
+    uint32_t base = s->position_count, n = o->corner_count, i;
+    if (!pti_reserve(&s->positions, &s->position_capacity, (size_t)base + n, sizeof *s->positions, user) ||
+        (has_vn && !pti_reserve(&s->normals, &s->normal_capacity, (size_t)s->normal_count + n, sizeof *s->normals, user)) ||
+        (has_vt && !pti_reserve(&s->uvs, &s->uv_capacity, (size_t)s->uv_count + n, sizeof *s->uvs, user)) ||
+        !pti_reserve(&s->meshes, &s->mesh_capacity, (size_t)s->mesh_count + 4, sizeof *s->meshes, user))
+        return pti_obj_no_memory(o);
+    for (k = 0; k < 4; k++) {
+        if (o->mesh[k] < 0) continue;
+        s->meshes[o->mesh[k]].has_normals = k >= 2;
+        s->meshes[o->mesh[k]].has_uvs = k % 2;
+        s->meshes[o->mesh[k]].normal_offset = (int64_t)s->normal_count - base;
+        s->meshes[o->mesh[k]].uv_offset = (int64_t)s->uv_count - base;
+        s->mesh_count++;
+    }
+    for (i = 0; i < n; i++) {
+        const pti_corner *c = &o->corners[i];
+        s->positions[s->position_count++] = o->v[c->v];
+        if (has_vn) s->normals[s->normal_count++] = c->vn == PTI_NONE ? pt_v3(0, 0, 0) : o->vn[c->vn];
+        if (has_vt) s->uvs[s->uv_count++] = c->vt == PTI_NONE ? pt_v2(0, 0) : o->vt[c->vt];
+    }
+    o->info->vertices = n;
+    s->committed = 0;
+    return 1;
+}
+
+static void pti_obj_free(pti_obj *o)
+{
+    void *user = o->scene->alloc_user;
+    pti_free(o->v, user);
+    pti_free(o->vn, user);
+    pti_free(o->vt, user);
+    pti_free(o->corners, user);
+    pti_free(o->face, user);
+    pti_free(o->mtls, user);
+    pti_free(o->pool, user);
+    pti_free(o->corner_table.slots, user);
+    pti_free(o->name_table.slots, user);
+#if PTI_HAS_TEXTURES
+    pti_free(o->pictures, user);
+#endif
+}
+
+PTDEF pt_result pt_load_obj(pt_scene *scene, const char *path, const pt_obj_options *options, pt_obj_info *info)
+{
+    const uint32_t materials = scene->material_count, triangles = scene->triangle_count, owned = scene->owned_count;
+    const int committed = scene->committed;
+    pt_obj_info unseen;
+    pti_obj o;
+    memset(&o, 0, sizeof o);
+    o.scene = scene;
+    o.info = info ? info : &unseen;
+    o.file = path ? path : "";
+    o.material = o.plain = o.mesh[0] = o.mesh[1] = o.mesh[2] = o.mesh[3] = -1;
+    if (options) o.options = *options;
+    memset(o.info, 0, sizeof *o.info);
+    if (scene->error != PT_OK) {
+        pti_obj_fail(&o, scene->error, pt_scene_error(scene));
+        return o.result;
+    }
+    if (pti_obj_prepare(&o) && pti_obj_read(&o, path)) pti_obj_finish(&o);
+    if (o.result != PT_OK) {
+        pti_disown(scene, owned);
+        scene->material_count = materials;
+        scene->triangle_count = triangles;
+        scene->committed = committed;
+        o.info->triangles = o.info->emissive_triangles = o.info->materials = o.info->textures = 0;
+        o.info->lo = o.info->hi = pt_v3(0, 0, 0);
+    }
+    if (o.result == PT_ERROR_MEMORY) { /* the scene itself is whole */
+        scene->error = PT_OK;
+        scene->error_text[0] = 0;
+    }
+    pti_obj_free(&o);
+    return o.result;
+}
+#endif /* PTI_HAS_OBJ */
 
 #endif /* PTI_HAS_FILES */
 
@@ -9106,7 +11126,7 @@ static void pti_svg_grid(pti_writer *w, const pti_axes *a)
         pti_svg_text(w, left - 8, pti_svg_y(a, v) + 4, "end", "", text);
     }
     pti_svg_text(w, (left + right) / 2, PTI_SVG_H - 14, "middle", "", "CPU seconds");
-    pti_svg_text(w, 16, (top + bottom) / 2, "middle", "transform=\"rotate(-90 16 192)\"", "square root of relMSE");
+    pti_svg_text(w, 16, (top + bottom) / 2, "middle", "transform=\"rotate(-90 16 212.5)\"", "square root of relMSE");
 }
 
 /* A dashed line of slope -1/2 through (x, y), cut to the axes. */
