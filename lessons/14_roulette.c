@@ -5,18 +5,21 @@
 
                   S = L_e + B f cos / (p q) S',    B = 1 with probability q, else 0:    E S = L_e + T E S
 
-              The mean is exact for every q, while cutting at d edges loses rho^d / (1 - rho), always ("directly
-              limiting bounces is wrong"). The price is variance. In a furnace (lesson 12) with mean square c rho^2 of
-              f cos / p, squaring the line above gives
+              with the density p of the direction, S' the same value at the next point, and T the operator of lesson
+              12. So the expected value is the radiance for every q: unbiased. Cutting at d edges loses rho^d / (1 -
+              rho), always ("directly limiting bounces is wrong"): biased. The price is variance. In a furnace where
+              each wall emits 1 and reflects rho, let c rho^2 be the mean square of f cos / p: c = 4/3 for uniform
+              directions, c = 1 for the cosine. Then squaring the line above gives
 
                   E S^2 = (1 + rho) / ((1 - rho) (1 - c rho^2 / q)),   mean edges of a path = 1 / (1 - q)
 
-              with c = 4/3 for uniform directions and c = 1 for the cosine; for q <= c rho^2 it is infinite. The time
-              for a given error goes as variance times edges, which is least at some q below 1.
+              and for q <= c rho^2 it is infinite. The time for a given error goes as variance times edges. With uniform
+              directions this is least at a q below 1; with the cosine it falls up to q = 1, where paths never end.
 
-              What shade() of the slides forgets: the emission L_e at p itself, so that a lamp in view of the camera
-              is black, and that lamps reflect, too: it returns at the first lamp. In a furnace, where all walls are
-              lamps, it gives rho instead of 1 / (1 - rho).
+              What shade() of the slides forgets: the emission L_e at its point, so that a lamp in view of the camera is
+              black, and that lamps reflect, too: it returns at the first lamp. In a furnace, where all walls are lamps,
+              it gives rho instead of 1 / (1 - rho).
+   PICTURE    The Cornell box, 8 samples a pixel: left cut at 3 edges, right with roulette. Both ask the lamp (17).
    BUILD      cc -O2 -I.. 14_roulette.c -o 14_roulette -lm -pthread
    RUN        ./14_roulette [samples] [output]
    PRINTS     roulette         samples     estimate        exact  std.error  seconds
@@ -24,8 +27,8 @@
               my q = 0.75        16384      2.00848            2     0.0093    0.029
               P_RR               edges     variance        exact  var*edges sec 0.1%
               my q = 0.75        4.048        1.429          1.4       5.79    0.628
-   WORDS      Russian roulette 俄罗斯轮盘赌; tail recursion 尾递归; unbiased 无偏; biased 有偏; variance 方差;
-              expected value 期望; throughput 吞吐量; bounce 弹射
+   WORDS      Russian roulette 俄罗斯轮盘赌; tail recursion 尾递归; unbiased 无偏; biased 有偏; variance 方差; expected value 期望;
+              throughput 吞吐量; bounce 弹射
    HEADER     [PT-11] pt_li_path_plain, pt_li_options (roulette, roulette_survival), [PT-19] pt_scene_furnace
    SOURCES    Arvo, Kirk: Particle Transport and Image Synthesis, 1990; the slides' shade() with P_RR
    Before: lesson 13, the branching solver. Next: lesson 15, path tracing. */
@@ -79,7 +82,8 @@ static const pt_ray first_ray = {{0, 0, 0.375}, {0.25, 0.5, -1}, 9};
 
 /* ---- the new piece: one direction, and an end by chance ------------------------------------------------ */
 
-/* The slides' recursion is the last thing that shade() does (tail recursion): a loop with a running product. */
+/* The slides' recursion is the last thing that shade() does (tail recursion): a loop with a running product, the
+   throughput. */
 static double my_shade(setting *s, pt_sampler *random)
 {
     double lo = 0, beta = 1;
@@ -117,7 +121,7 @@ static double its_shade(setting *s, pt_sampler *random)
 
 /* ---- tables, the picture ------------------------------------------------------------------------------- */
 
-/* Is the mean right for every q, and what does it cost? Last column: seconds for an error of 0.1 %. */
+/* Is the mean right for every q, and what does it cost? sec 0.1%: seconds until the error is 0.1 % of the mean. */
 static void table(const char *who, value_fn value, setting *s, uint32_t n)
 {
     static const double q[6] = {0.6, 0.7, 0.75, 0.8, 0.9, 0.95};
@@ -148,7 +152,6 @@ static void table(const char *who, value_fn value, setting *s, uint32_t n)
     check(as_predicted, text);
 }
 
-/* The Cornell box: left cut at 3 edges, right with roulette; 8 samples a pixel. */
 static void picture(const char *output)
 {
     enum { SIZE = 150 };
@@ -194,21 +197,20 @@ int main(int argc, char **argv)
           "cutting loses rho^4 / (1 - rho), however many samples are taken");
     table("my", my_shade, &s, (uint32_t)n);
     table("its", its_shade, &s, (uint32_t)n);
-    printf("What to see: every q is right; mine is fastest for q from 0.7 to 0.8: least variance * edges.\n");
+    printf("What to see: every q is right; the seconds for one error follow variance * edges.\n");
     picture(argc > 2 ? argv[2] : "14_roulette");
     pt_scene_free(&s.scene);
     printf("lesson 14: %d passed, %d failed\n", passed, failed);
-    if (!MISTAKE) return failed != 0;
-    printf("exercise %d is a mistake: %s\n", EX, failed ? "the checks noticed it" : "NOBODY NOTICED");
-    return failed == 0;
+    if (MISTAKE) printf("exercise %d is a mistake: %s\n", EX, failed ? "the checks noticed it" : "NOBODY NOTICED");
+    return MISTAKE ? failed == 0 : failed != 0;
 }
 
 /* EXERCISES
-   (1) Predict: rho = 0.8 (-DEX=1). For which q is the variance of mine infinite, and does the table show it?
-       Answer: for q <= 4/3 * 0.64 = 0.853; any single run shows a finite number, small and wrong: values that are
-       rare and huge are missing. This is why survival must follow the throughput.
-   (2) Break: do not divide by q (-DEX=2), the mean is below 2 for every q but 1; take shade() of the slides as it
-       stands (-DEX=3), 0.5; cut at 4 edges besides (-DEX=4), 1.875. All are dark; only the exact value tells.
+   (1) Predict: rho = 0.8 (-DEX=1). For which q is the variance of mine infinite, and does the table show it? Answer:
+       for q <= 4/3 * 0.64 = 0.853; any run shows a finite number that means nothing and changes with every seed: values
+       that are rare and huge are missing. This is why survival must follow the throughput.
+   (2) Break: do not divide by q (-DEX=2): 1 / (1 - q rho), 1.818 for q = 0.9. Take shade() of the slides as it stands
+       (-DEX=3): 0.5. Use roulette and also cut at 4 edges (-DEX=4): 1.875. All are dark; only the exact value tells.
    (3) Extend: which q is best for c = 4/3 and rho = 1/2? Answer: the least of (3 / (1 - 1/(3q)) - 4) / (1 - q) is
        5.60, at q = 0.756. For c = 1 it falls to 4/3 as q goes to 1: with f cos / p constant, only roulette has
        variance. */

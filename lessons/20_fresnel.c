@@ -1,16 +1,19 @@
 /* Lesson 20: Snell and Fresnel
 
    QUESTION   How much light does glass reflect, how much does it let through, and in which direction?
-   IDEA       Snell: n1 sin t1 = n2 sin t2. Fresnel, polarised across (s) and in (p) the plane of incidence, and not:
+   IDEA       Snell's law: n1 sin t1 = n2 sin t2. The Fresnel term for polarization across (s) and in (p) the plane of
+              incidence, and the reflectance R for light without:
 
                   R_s = ((n1 cos t1 - n2 cos t2) / (n1 cos t1 + n2 cos t2))^2
                   R_p = ((n1 cos t2 - n2 cos t1) / (n1 cos t2 + n2 cos t1))^2          R = (R_s + R_p) / 2
 
-              From the dense side there is no t2 beyond the critical angle asin(n2/n1): all light is reflected. R_p = 0
-              at Brewster's angle atan(n2/n1). Schlick: R0 + (1 - R0) (1 - cos t)^5; as it stands on the slides it fails
-              for n1 > n2, where t must be the angle in the thinner medium and total reflection is missing. (Their
-              "brightness of shadows varies" means reflections.) The mean over diffuse (cosine-distributed) light, F =
-              2 int R(c) c dc, is known (Walsh); inside, by reciprocity, 1 - F_inside = (1 - F) / n^2.
+              From the dense side there is no t2 beyond the critical angle asin(n2/n1): total internal reflection. R_p
+              = 0 at Brewster's angle atan(n2/n1). Schlick: R0 + (1 - R0) (1 - cos t)^5; as it stands on the slides it
+              fails for n1 > n2, where t must be the angle in the thinner medium and total reflection is missing.
+              (Their "brightness of shadows varies" means reflections.) The mean over diffuse (cosine-distributed)
+              light, F = 2 int R(c) c dc, is known (Walsh); inside, by reciprocity, 1 - F_inside = (1 - F) / n^2.
+   PICTURE    Up from under water: Snell's window has all of the sky; around it the water mirrors floor and ball.
+   PLOT       R_s, R_p, R and Schlick's formula over the angle, from air (left) and from inside.
    BUILD      cc -O2 -I.. 20_fresnel.c -o 20_fresnel -lm -pthread
    RUN        ./20_fresnel [samples] [output]          writes also output.svg, the curves over the angle
    PRINTS     angle             R_s          R_p            R      Schlick   error
@@ -150,7 +153,6 @@ static void table(uint32_t n)
     check(good, "means within 5 standard errors of Walsh's formula");
 }
 
-/* R_s, R_p, R and Schlick's formula over the angle, from air (left) and from inside. */
 static void plot(const char *path)
 {
     static const char *const colour[4] = {"#c33", "#36c", "#000", "#e90"};
@@ -174,7 +176,6 @@ static void plot(const char *path)
     fclose(file);
 }
 
-/* Up from under water: Snell's window has all of the sky; around it the water mirrors the floor, where a ball lies. */
 static void picture(const char *output)
 {
     pt_scene scene = PT_SCENE_INIT;
@@ -207,9 +208,8 @@ int main(int argc, char **argv)
     printf("What to see: more than half of the diffuse light inside is kept in; coins have more noise.\n");
     picture(argc > 2 ? argv[2] : "20_fresnel");
     printf("lesson 20: %d passed, %d failed\n", passed, failed);
-    if (!MISTAKE) return failed != 0;
-    printf("exercise %d is a mistake: %s\n", EX, failed ? "the checks noticed it" : "NOBODY NOTICED");
-    return failed == 0;
+    if (MISTAKE) printf("exercise %d is a mistake: %s\n", EX, failed ? "the checks noticed it" : "NOBODY NOTICED");
+    return MISTAKE ? failed == 0 : failed != 0;
 }
 
 /* EXERCISES
@@ -217,4 +217,4 @@ int main(int argc, char **argv)
    (2) Break: Schlick as on the slides (-DEX=2), Snell's ratio upside down (-DEX=3), one polarisation for both (-DEX=4).
        All pass the check of the energy: why? Answer: R_s + T_s = 1 is an identity for whatever cos t2.
    (3) Extend: a window pane has two surfaces, and light goes to and fro between them. Sum the series. Answer: R =
-       2F/(1+F), .0769 at normal incidence for n = 1.5, not 2F = .08. */
+       2F/(1+F), 0.0769 at normal incidence for n = 1.5, not 2F = 0.08. */

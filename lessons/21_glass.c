@@ -1,4 +1,4 @@
-/* Lesson 21: Glass and caustics
+/* Lesson 21: glass and caustics
 
    QUESTION   A path meets glass: which way does it go, with what weight, and what does it not find there?
    IDEA       Toss a coin with Fresnel's R: reflect, else refract; the weights R/R and (1-R)/(1-R) are 1. But a beam
@@ -6,21 +6,23 @@
 
                   n1 sin t1 = n2 sin t2   =>   n1^2 cos t1 dw1 = n2^2 cos t2 dw2   =>   L1 / n1^2 = L2 / n2^2
 
-              A path from the eye carries the weight 1/n^2 into glass, n^2 out of it. They cancel for a path that
-              leaves again: a missing n^2 is invisible until a lamp, or the eye, is inside.
-              Caustics LS+DE: a path from the eye finds them when its diffuse bounce happens to hit the lamp through the
-              glass. No shadow ray helps: the glass is in its way. Smaller lamps: rarer, brighter hits. Point lamps:
-              probability zero, a black caustic, and no noise to warn of it.
-              All this is known for endless water over a floor of albedo rho that emits Le, under a sky of radiance Ls
-              and a sun in the zenith of irradiance pi Es, however large. With Fresnel's reflectances F0 straight down,
-              Fo and Fi for diffuse light from outside and inside (lesson 20), F where the eye looks:
+              A path from the eye carries the weight 1/n^2 into glass by refraction, n^2 out of it. They cancel for a
+              path that leaves again: a missing n^2 is invisible until a lamp, or the eye, is inside.
+              Caustics, LS+DE in light path notation, are light that specular surfaces bundle: a path from the eye
+              finds them when its diffuse bounce happens to hit the lamp through the glass. No shadow ray helps: the
+              glass is in its way. Smaller lamps: rarer, brighter hits. Point lamps: probability zero, black, and no
+              noise to warn of it.
+              All this is known for endless water over a floor of albedo rho = 1/2 that emits Le, under a sky of
+              radiance Ls and a sun in the zenith of irradiance pi Es. With Fresnel's reflectances F0 straight down, Fo
+              and Fi for diffuse light from outside and inside (lesson 20), F where the eye looks:
 
                   Lw = (Le + rho ((1-Fo) Ls + (1-F0) Es)) / (1 - rho Fi)       of the floor, seen in the water
                   L  = F Ls + (1-F)/n^2 Lw                                     from above
+   PICTURE    A glass ball under a large lamp (left), and under a small one of the same power (right), 24 samples a
+              pixel.
    BUILD      cc -O2 -I.. 21_glass.c -o 21_glass -lm -pthread
    RUN        ./21_glass [samples] [output]
-   PRINTS     pool             samples     estimate        exact  std.error  seconds
-              my sun 2 deg      131072     0.775627     0.641301      0.093    0.009
+   PRINTS     my sun 2 deg      131072     0.775627     0.641301      0.093    0.009
               its point         131072            0     0.641301          0    0.305
    WORDS      caustics 焦散; refraction 折射; radiance 辐亮度; specular 镜面; light path notation 光路传输记法
    HEADER     [PT-08] pt_material_dielectric, pt_fresnel_dielectric, [PT-11] pt_li_path, [PT-19] pt_scene_pool
@@ -164,7 +166,6 @@ static void table(uint32_t n)
     check(error[6] == 0, "the caustic of a point light: black, error bar 0");
 }
 
-/* A glass ball under a large lamp (left), and under a small one of the same power (right). */
 static void picture(const char *output)
 {
     enum { W = 160, H = 120 };
@@ -206,15 +207,14 @@ int main(int argc, char **argv)
     printf("What to see: the smaller the sun, the noisier its caustic; a point light has none, without noise.\n");
     picture(argc > 2 ? argv[2] : "21_glass");
     printf("lesson 21: %d passed, %d failed\n", passed, failed);
-    if (!MISTAKE) return failed != 0;
-    printf("exercise %d is a mistake: %s\n", EX, failed ? "the checks noticed it" : "NOBODY NOTICED");
-    return failed == 0;
+    if (MISTAKE) printf("exercise %d is a mistake: %s\n", EX, failed ? "the checks noticed it" : "NOBODY NOTICED");
+    return MISTAKE ? failed == 0 : failed != 0;
 }
 
 /* EXERCISES
    (1) Predict: glass, n = 1.5, instead of water (-DEX=1). Is the floor under the sky brighter or darker? Answer:
-       darker, .316071 instead of .358699; more is reflected, and more is kept inside.
+       darker, 0.316071 instead of 0.358699; more is reflected, and more is kept inside.
    (2) Break: no n^2 (-DEX=2), its inverse (-DEX=3). Right under the sky, where it cancels; the lit floor is n^2 and n^4
        times too bright, a sun as many times too dark. Fresnel's R from the wrong side (-DEX=4): all rows fail.
-   (3) Extend: which fraction of my values is not 0 for the sun as it is (half angle .267 degrees)? Answer: a hit has
-       the value n^2 / sin^2 a, so .6413 sin^2 a / n^2 = 7.9e-6: one path in 127,000; 1 % takes 1.3e9 paths a pixel. */
+   (3) Extend: which fraction of my values is not 0 for the sun as it is (half angle 0.267 degrees)? Answer: a hit has
+       the value n^2 / sin^2 a, so 0.6413 sin^2 a / n^2 = 7.9e-6: one path in 127,000; 1 % takes 1.3e9 paths a pixel. */

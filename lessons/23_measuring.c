@@ -1,4 +1,4 @@
-/* Lesson 23: Measuring a BRDF: gonioreflectometer and MERL table
+/* Lesson 23: measuring a BRDF: gonioreflectometer and MERL table
 
    QUESTION   How does the BRDF of a real thing get into a renderer, and what is in such a table?
    IDEA       A gonioreflectometer sends a thin beam along wo and counts what arrives in a sensor of directions S:
@@ -6,11 +6,13 @@
                   f = (fraction of the light that arrives) / int_S cos dw,   a cone of half angle a: pi sin^2 a
 
               is the mean of f there. A Phong lobe f = rho (n+2)/(2 pi) cos^n sends rho (1 - cos^(n+2) a) into the cone.
-              An isotropic BRDF has 3 angles: 90 x 90 x 180 = 1,458,000 cells for each colour. Which angles? A highlight
-              is where the half vector h = (wo + wi)/|wo + wi| is near the normal: take theta_h and the angles theta_d,
-              phi_d of wi seen from h (Rusinkiewicz). Cells are even in sqrt(theta_h), so fine in the highlight. By
-              reciprocity 180 cells do for phi_d: swapping wo and wi adds 180 degrees. The slides store (theta_i,
-              theta_o, |phi_i - phi_o|), as they are measured; the MERL files hold (theta_h, theta_d, phi_d).
+              An isotropic BRDF has 3 angles, in tabular form 90 x 90 x 180 = 1,458,000 cells for each colour. Which
+              angles? A highlight is where the half vector h = (wo + wi)/|wo + wi| is near the normal: take theta_h and
+              the angles theta_d, phi_d of wi seen from h (Rusinkiewicz). Cells are even in sqrt(theta_h), so fine in
+              the highlight. By reciprocity 180 cells do for phi_d: swapping wo and wi adds 180 degrees. The slides
+              store (theta_i, theta_o, |phi_i - phi_o|), as they are measured; the MERL files hold (theta_h, theta_d,
+              phi_d).
+   PICTURE    Two balls under a lamp between them: the left one has the Phong lobe itself, the right one its table.
    BUILD      cc -O2 -I.. 23_measuring.c -o 23_measuring -lm -pthread
    RUN        ./23_measuring [samples] [output]          takes 40 MB of memory
    PRINTS     cells              pairs    rms error                             seconds
@@ -158,7 +160,6 @@ static double cells(const char *name, int kind, uint32_t n, int bad[2])
     return sqrt(wrong / all);
 }
 
-/* Two balls under a lamp between them: the left one has the Phong lobe itself, the right one its table. */
 static void picture(const char *output, pt_material table)
 {
     pt_material phong = pt_material_phong(pt_rgb_grey(0), pt_rgb_grey((pt_real)rho), (pt_real)exponent);
@@ -206,15 +207,14 @@ int main(int argc, char **argv)
     picture(argc > 2 ? argv[2] : "23_measuring", material);
     pt_measured_free(&table);
     printf("lesson 23: %d passed, %d failed\n", passed, failed);
-    if (!MISTAKE) return failed != 0;
-    printf("exercise %d is a mistake: %s\n", EX, failed ? "the checks noticed it" : "NOBODY NOTICED");
-    return failed == 0;
+    if (MISTAKE) printf("exercise %d is a mistake: %s\n", EX, failed ? "the checks noticed it" : "NOBODY NOTICED");
+    return MISTAKE ? failed == 0 : failed != 0;
 }
 
 /* EXERCISES
-   (1) Predict: exponent 1000, not 100 (-DEX=1). Which error grows more? Answer: .046 to .144; MERL's .030 to .049.
+   (1) Predict: exponent 1000, not 100 (-DEX=1). Which error grows more? Answer: 0.046 to 0.144; MERL's 0.030 to 0.049.
    (2) Break: the slides' angles as index (-DEX=2), theta_h instead of its root (-DEX=3). Cells are still found back
        from their middles: a table that is consistent with itself can still be no MERL table.
-   (3) Extend: measure a diffuse sample of albedo .5 with pt_measured_scatter, which is handed a scatter() and knows no
-       f: 1e6 samples, blocks of 30^3 cells. Answer: .159 (.5/pi) in all blocks to a few percent, but for two at grazing
-       angles, which few rays reach: .08 and .21. */
+   (3) Extend: measure a diffuse sample of albedo 0.5 with pt_measured_scatter, which is handed a scatter() and knows
+       no f: 1e6 samples, blocks of 30^3 cells. Answer: 0.159 (0.5/pi) in all blocks to a few percent, but for two at
+       grazing angles, which few rays reach: 0.08 and 0.21. */

@@ -1,20 +1,22 @@
-/* Lesson 24: Is it correct? The Cornell box, spectra, and a photograph
+/* Lesson 24: is it correct? The Cornell box, spectra, and a photograph
 
    QUESTION   "Is path tracing correct? Yes, almost 100 %." How would we know?
-   IDEA       An image that looks right proves nothing. Compare numbers with error bars with somebody else's: the
-              radiance at twelve points of the Cornell box, found by another program by other methods. Two unbiased
-              estimates differ by more than 5 standard errors sqrt(se1^2 + se2^2) once in two million times.
-              Three bands R, G, B are an approximation themselves. Light is a spectrum, each wavelength has its own
-              rendering equation, and the eye comes last: Y = int ybar(l) L(l) dl / int ybar(l) dl. A renderer of three
-              bands solves it for three wavelengths at a time, if walls and lamp have the values there instead of their
-              colours. The RGB of a product of spectra is not the product of their RGB; at the red wall it shows.
-              A photograph differs still: reflectances were measured on other samples, the lamp is no uniform Lambertian
-              square, the room around is not black, lens and film scatter, vignette and have a response curve, and no
-              screen shows a lamp a hundred times as bright as the wall beside it.
+   IDEA       An image that looks right proves nothing. Compare numbers with error bars with somebody else's, as near
+              to ground truth as one gets: the radiance at twelve points of the Cornell box, found by another program
+              by other methods. Two unbiased estimates differ by more than 5 standard errors sqrt(se1^2 + se2^2) once
+              in two million times.
+              Three bands R, G, B are an approximation themselves. Light is a spectrum, each wavelength l has its own
+              rendering equation, and the eye comes last, with its color matching functions: Y = int ybar(l) L(l) dl /
+              int ybar(l) dl. A renderer of three bands solves it for three wavelengths at a time, if walls and lamp
+              have the values there instead of colours. The RGB of a product of spectra is not the product of their
+              RGB; at the red wall it shows.
+              A photograph differs still: reflectances were measured on other samples, the lamp is no uniform
+              Lambertian square, the room around is not black, lens and film scatter, vignette and have a response
+              curve, and no screen shows a lamp a hundred times as bright as the wall beside it.
+   PICTURE    Left three bands by the header, with white dots at the probes; right spectra.
    BUILD      cc -O2 -I.. 24_is_it_correct.c -o 24_is_it_correct -lm -pthread
    RUN        ./24_is_it_correct [samples] [output]
-   PRINTS     probe            samples     estimate        exact  std.error  seconds
-              its G at 4         16384    0.0101499      0.01007    6.4e-05    0.034
+   PRINTS     its G at 4         16384    0.0101499      0.01007    6.4e-05    0.034
                my Y at 4         16384    0.0429134     0.042913    0.00021    0.037
    WORDS      Cornell box 康奈尔盒; ground truth 真值; spectrum 光谱; wavelength 波长; unbiased 无偏; color matching function 颜色匹配函数
    HEADER     [PT-05] pt_cie_xyz, pt_xyz_to_rgb, [PT-11] pt_li_path, [PT-19] pt_scene_cornell, pt_cornell_spectrum
@@ -29,7 +31,7 @@
 #ifndef EX
 #define EX 0 /* an exercise, see the end */
 #endif
-enum { MISTAKE = EX >= 2, PROBES = 12, SETS = 25 };
+enum { PROBES = 12, SETS = 25, MISTAKE = EX >= 2 };
 
 static int passed, failed;
 
@@ -159,7 +161,6 @@ static void table(const pt_scene *box, const pt_camera *camera, uint32_t n)
     check(spectral < 5, "Y of spectra: within 5 standard errors");
 }
 
-/* Left: three bands by the header, with the probes; right: spectra. */
 static void picture(const pt_scene *box, const pt_camera *camera, const char *output)
 {
     enum { W = 128 };
@@ -206,15 +207,14 @@ int main(int argc, char **argv)
     picture(box, &camera, argc > 2 ? argv[2] : "24_is_it_correct");
     for (int set = 0; set <= SETS; set++) pt_scene_free(&box[set]);
     printf("lesson 24: %d passed, %d failed\n", passed, failed);
-    if (!MISTAKE) return failed != 0;
-    printf("exercise %d is a mistake: %s\n", EX, failed ? "the checks noticed it" : "NOBODY NOTICED");
-    return failed == 0;
+    if (MISTAKE) printf("exercise %d is a mistake: %s\n", EX, failed ? "the checks noticed it" : "NOBODY NOTICED");
+    return MISTAKE ? failed == 0 : failed != 0;
 }
 
 /* EXERCISES
-   (1) Predict: the lamp has albedo 0 instead of .78 (-DEX=1). Does a probe notice? Answer: not with 16384 paths each.
+   (1) Predict: the lamp has albedo 0 instead of 0.78 (-DEX=1). Does a probe notice? Answer: not with 16384 paths each.
        With 200000 four greens are off by more than 5: an agreement says no more than what it could have seen.
    (2) Break: light counted twice, by hitting the lamp and by asking it (-DEX=2); two bounces only (-DEX=3); Y of
        three bands (-DEX=4). Which makes the picture brighter? Answer: the first; brighter is not more right.
-   (3) Extend: use one wavelength a path instead of three. The same mean Y, but which standard error? Answer: .0011 at
-       probe 0, the root of 3 times .00063. And the picture has colour noise, as each path has a colour of its own. */
+   (3) Extend: use one wavelength a path instead of three. The same mean Y, but which standard error? Answer: 0.0011 at
+       probe 0, the root of 3 times 0.00063. And the picture has colour noise, as each path has a colour of its own. */
