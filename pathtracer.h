@@ -59,7 +59,7 @@
        [PT-09] lights
        [PT-10] scene, camera, film
        [PT-11] integrators: path tracing, Whitted, distribution, branching; light-path expressions
-       [PT-17] image files: PPM, PFM, PNG
+       [PT-17] files: pictures (PPM, PFM, PNG), films, models (OBJ with MTL)
        [PT-18] render driver: passes, threads, budgets, error against run time
        [PT-19] canonical scenes
 
@@ -73,7 +73,8 @@
        PTDEF               what stands before every public function (default: extern, or static)
        PT_NO_THREADS       one thread, no pthread
        PT_NO_STDIO         no FILE, no printing; implies PT_NO_FILES
-       PT_NO_FILES         no image writers
+       PT_NO_FILES         no files: pictures, films, tables; implies PT_NO_OBJ
+       PT_NO_OBJ           no models from OBJ files
        PT_NO_BVH           linear search instead of the tree
        PT_NO_ENVIRONMENT   no light from the background
        PT_NO_MICROFACET    no rough metal and glass, no smooth metal, no Oren-Nayar
@@ -216,6 +217,11 @@
 #define PTI_HAS_FILES 0
 #else
 #define PTI_HAS_FILES 1
+#endif
+#if defined(PT_NO_OBJ) || defined(PT_NO_FILES)
+#define PTI_HAS_OBJ 0
+#else
+#define PTI_HAS_OBJ 1
 #endif
 #ifdef PT_NO_BVH
 #define PTI_HAS_BVH 0
@@ -1176,6 +1182,8 @@ typedef struct pt_scene {
         parallelogram_count, delta_light_count;
     uint32_t material_capacity, position_capacity, normal_capacity, uv_capacity, triangle_capacity,
         mesh_capacity, sphere_capacity, parallelogram_capacity, delta_light_capacity;
+    void **owned;            /* blocks that live as long as the scene: the textures of loaded models       */
+    uint32_t owned_count, owned_capacity;
     pt_rgb environment;      /* constant radiance, or the mean of the image                                */
 #if PTI_HAS_ENVIRONMENT
     pt_environment_map map;  /* rgb = NULL: constant                                                       */
@@ -1523,22 +1531,38 @@ PTDEF pt_rgbd pt_li_branching(const pt_scene *scene, const pt_ray *ray, pt_sampl
 #endif
 
 /* =====================================================================================================
-   [PT-17] IMAGE FILES: declarations
+   [PT-17] FILES: declarations
    ===================================================================================================== */
 
 #if PTI_HAS_FILES
-/* Write the film's picture times `exposure` (>= 0) under `path`: to path.part first, then renamed, so that no
-   partial file ever stands there.
-   PPM: binary P6, 8 bits, sRGB transfer, clipped. PFM: linear float, rows from the bottom, little-endian.
-   PNG: 8 bits, sRGB. */
+/* All that is written goes to path.part first, is flushed, synced to the disk where the system shows how (POSIX
+   fsync, Windows _commit; nowhere with strict -std=c99 after another header), and then renamed: under `path` stands
+   what was there before or the whole new file, also when the disk is full. PT_ERROR_FILE if not; path.part is removed.
+
+   The film's picture times `exposure` (>= 0), clipped, with the sRGB transfer; PPM is binary (P6) with 8 bits, PNG
+   has 8 bits. PFM: linear float, rows from the bottom, little-endian. */
 PTDEF pt_result pt_write_ppm(const char *path, const pt_film *film, double exposure);
 PTDEF pt_result pt_write_pfm(const char *path, const pt_film *film);
 PTDEF pt_result pt_write_png(const char *path, const pt_film *film, double exposure);
+/* PPM as binary numbers (P6) or as text (P3), one pixel a line, with 8 or with 16 bits (values to 65535; in P6 the
+   more significant byte first). */
+typedef enum pt_ppm_kind { PT_PPM_P6 = 0, PT_PPM_P6_16, PT_PPM_P3, PT_PPM_P3_16 } pt_ppm_kind;
+PTDEF pt_result pt_write_ppm_as(const char *path, const pt_film *film, double exposure, pt_ppm_kind kind);
 /* The same from plain arrays: rows from the top, three bytes or three floats a pixel. What PNG needs to work
    in is allocated with user = NULL. PNG: at most 600 megapixels. */
 PTDEF pt_result pt_write_ppm_bytes(const char *path, const unsigned char *rgb, int width, int height);
 PTDEF pt_result pt_write_png_bytes(const char *path, const unsigned char *rgb, int width, int height);
 PTDEF pt_result pt_write_pfm_floats(const char *path, const float *rgb, int width, int height);
+
+/* The whole state of a film (at most 1024 classes), bit for bit: sums of both halves and of splats, albedo, normal,
+   depth, classes, counts, ranges of samples, fingerprint. A render that goes on with a film from a file ends with
+   the bits of one that was never interrupted. PT_ERROR_ARGUMENT for an empty film, and for one whose ranges do not
+   hold as many samples as it counts. */
+PTDEF pt_result pt_film_write(const char *path, const pt_film *film);
+/* Reads it; what the film held is freed first. PT_ERROR_FILE: not there, not a film, truncated or changed (a 64-bit
+   checksum covers every byte, and is asked before memory is). PT_ERROR_MISMATCH: a whole film in another version of
+   the format. Then, and without memory, the film stays empty. */
+PTDEF pt_result pt_film_read(const char *path, pt_film *film);
 
 /* A picture in memory: width * height * 3 linear values, rows from the top. Start from PT_IMAGE_INIT. */
 typedef struct pt_image {
@@ -1547,8 +1571,10 @@ typedef struct pt_image {
     int width, height;
 } pt_image;
 #define PT_IMAGE_INIT PTI_ZERO_INIT
-/* Reads a PFM (PF, either byte order) or a binary PPM (P6, 8 bits; its sRGB transfer is undone). A file that is
-   truncated, larger than 65536 pixels a side or anything else is PT_ERROR_FILE, and the image stays empty. */
+/* Reads a picture, whatever its name: PFM (PF, either byte order; linear), PPM (P6 and P3, values up to 65535) or PNG
+   (all colour types and depths, interlaced too; alpha is dropped), whose sRGB transfer is undone. A file that is
+   truncated, beyond 2 GiB, larger than 65536 pixels a side or anything else, or whose checksums (PNG) are wrong, is
+   PT_ERROR_FILE, and the image stays empty. Memory is asked for only where the size of the file bears it out. */
 PTDEF pt_result pt_read_image(const char *path, pt_image *image);
 PTDEF void pt_image_free(pt_image *image);
 
@@ -1558,6 +1584,65 @@ PTDEF void pt_image_free(pt_image *image);
 PTDEF pt_result pt_measured_write(const char *path, const pt_measured *m);
 PTDEF pt_result pt_measured_read(const char *path, pt_measured *m);
 #endif
+#endif
+
+#if PTI_HAS_OBJ
+enum {
+    PT_OBJ_MATERIAL = 1,     /* faces without a material get options.material, not a diffuse grey of 0.8   */
+    PT_OBJ_NO_MTL = 2,       /* no MTL file is read: all faces are without a material                      */
+    PT_OBJ_NO_TEXTURES = 4   /* map_Kd is ignored                                                          */
+};
+
+/* How to load a model; zero means the default. */
+typedef struct pt_obj_options {
+    double transform[3][4];  /* rows of (A | t): p becomes A p + t; all zero = as it is. A needs an inverse; if it
+                                mirrors, corners are reordered, so that outside stays outside              */
+    double emission_scale;   /* >= 0: multiplies Ke; 0 = 1                                                 */
+    int material;            /* see PT_OBJ_MATERIAL                                                        */
+    unsigned flags;          /* PT_OBJ_X                                                                   */
+} pt_obj_options;
+
+#define PT_OBJ_WARNINGS 8
+/* What was loaded, and what was not. */
+typedef struct pt_obj_info {
+    uint32_t triangles, vertices;  /* that the scene got; vertices are combinations of v, vt and vn        */
+    uint32_t emissive_triangles;
+    uint32_t materials, textures;  /* that faces use, and the scene got                                    */
+    uint32_t degenerate_faces;     /* that have no area: left out                                          */
+    uint32_t skipped_lines;        /* whose keyword means nothing here (curves, lines, other maps)         */
+    pt_vec3 lo, hi;                /* box of all triangles, transformed                                    */
+    uint32_t warning_count;        /* all of them,                                                         */
+    char warnings[PT_OBJ_WARNINGS][160]; /* and the first as sentences: "model.obj:12: ..."                */
+    char error[160];               /* why nothing was loaded; empty if all went well                       */
+} pt_obj_info;
+
+/* Adds a model from a Wavefront OBJ file, and the materials that its faces use from the MTL files that it names (paths
+   are relative to the file that names them, with / or \). options NULL: all defaults; info may be NULL. pt_commit is
+   the caller's. The scene owns the textures.
+
+   Of OBJ: v (colours and weights after it are ignored), vt, vn, f with any corners, indices from 1, or negative from
+   the latest, mtllib, usemtl. Polygons are cut into triangles in their own plane, concave ones too. Groups and smoothing
+   groups are ignored: without vn a face is flat. Of MTL: Kd, Ks, Ke, Ns, Ni, d, Tr, illum, Pr, Pm and map_Kd with its
+   option -s (others are skipped with a warning). The first line that fits says what a material becomes:
+
+       Pm >= 0.5                         metal of reflectance Kd head on, roughness Pr
+       illum 4, 6, 7, 9, or d < 0.5      glass of index Ni (1.5 without), roughness Pr: closed, clear
+       illum 3, 5 and Ks >= Kd           mirror of reflectance Ks; with Pr > 0 metal as above
+       Pr < 0.04                         diffuse Kd under a smooth coat of index Ni (1.5 without)
+       Pr                                diffuse Kd and Blinn-Phong as wide as roughness Pr, of reflectance
+                                         ((Ni - 1) / (Ni + 1))^2
+       Ks > 0, illum not 0 or 1          diffuse Kd and Phong with Ks and exponent Ns (energy-conserving)
+       else                              diffuse Kd
+
+   Kd is 0.8 without a line, 1 if it is black or missing beside a map_Kd. Kd + Ks above 1 is scaled down, with a warning.
+   Ke is emitted by whatever it is, on the outside (counter-clockwise). Tf and Ka are ignored. What cannot be read of
+   materials and textures is a warning, and what stands above is used instead.
+
+   PT_ERROR_FILE: no file, more than 2 GiB, a number that is none or not finite, an index out of range, no triangle.
+   PT_ERROR_LEFT_OUT: a material needs what a PT_NO_X switch left out; pt_scene_error and info.error name it, and the
+   scene is wrong from then on. PT_ERROR_ARGUMENT: options out of range. PT_ERROR_MEMORY. After an error nothing has
+   been added. */
+PTDEF pt_result pt_load_obj(pt_scene *scene, const char *path, const pt_obj_options *options, pt_obj_info *info);
 #endif
 
 /* =====================================================================================================
@@ -1777,9 +1862,16 @@ PTDEF pt_rgb pt_cornell_rgb(const char *name);
 #define NOMINMAX
 #endif
 #include <windows.h>
-#elif PTI_HAS_THREADS
+#include <io.h>
+#elif defined(__unix__) || defined(__APPLE__)
+#if PTI_HAS_THREADS
 #include <pthread.h>
+#endif
 #include <unistd.h>
+#if defined(_GNU_SOURCE) || (defined(_POSIX_C_SOURCE) && _POSIX_C_SOURCE >= 200809L) || \
+    (!defined(_POSIX_C_SOURCE) && !defined(__STRICT_ANSI__))
+#define PTI_HAS_FSYNC 1 /* the C library shows it */
+#endif
 #endif
 
 #ifdef __cplusplus
@@ -6405,6 +6497,12 @@ static unsigned pti_find_needs(const pt_scene *scene)
     return needs;
 }
 
+/* Frees the blocks that the scene owns, but for the first `keep`. */
+static void pti_disown(pt_scene *scene, uint32_t keep)
+{
+    while (scene->owned_count > keep) pti_free(scene->owned[--scene->owned_count], scene->alloc_user);
+}
+
 /* Frees what pt_commit made. */
 static void pti_uncommit(pt_scene *scene)
 {
@@ -6468,6 +6566,8 @@ PTDEF void pt_scene_free(pt_scene *scene)
 {
     void *user = scene->alloc_user;
     pti_uncommit(scene);
+    pti_disown(scene, 0);
+    pti_free(scene->owned, user);
     pti_free(scene->materials, user);
     pti_free(scene->positions, user);
     pti_free(scene->normals, user);
@@ -7758,11 +7858,33 @@ PTDEF pt_rgbd pt_li_branching(const pt_scene *scene, const pt_ray *ray, pt_sampl
 
 
 /* =====================================================================================================
-   [PT-17] IMAGE FILES: implementation
+   [PT-17] FILES: implementation
    =====================================================================================================
-   Every file is written under a temporary name and renamed when it is whole. */
+   Writing: every file is written under a temporary name, synced, and renamed when it is whole; a checkpoint is thus
+   the last one or the one before, never half of one.
+
+   Reading: a file is a stranger. It is read whole, or its size is known, before memory is asked for; each count is
+   compared with what is left of it, each index with what it points into, and each number with its range. Files of
+   more than 2 GiB are refused, but for films. Numbers in texts are parsed here: strtod would obey the locale.
+
+   A film file: 64 bytes of head (see pti_film_head), the ranges of samples (first and end, 32 bits each), the sums as
+   64-bit floats in the order of pti_film_plane, and the CRC-64 of all that [ECMA 182, reflected]. Everything is
+   little-endian. A CRC finds every change within 8 consecutive bytes, and misses others once in 2^64. */
 
 #if PTI_HAS_FILES
+
+/* Hands what the system still holds of a flushed file to the disk; 0: that failed. */
+static int pti_sync(FILE *file)
+{
+#ifdef PTI_HAS_FSYNC
+    return fsync(fileno(file)) == 0;
+#elif defined(_WIN32)
+    return _commit(_fileno(file)) == 0;
+#else
+    (void)file;
+    return 1;
+#endif
+}
 
 typedef struct pti_writer {
     FILE *file;
@@ -7795,10 +7917,10 @@ static void pti_write_text(pti_writer *w, const char *text)
 /* Closes, and gives the file its name if all went well. */
 static pt_result pti_writer_close(pti_writer *w, const char *path)
 {
-    if (fflush(w->file) != 0) w->failed = 1;
+    if (fflush(w->file) != 0 || !pti_sync(w->file)) w->failed = 1;
     if (fclose(w->file) != 0) w->failed = 1;
 #if defined(_WIN32)
-    if (!w->failed && !MoveFileExA(w->temporary, path, MOVEFILE_REPLACE_EXISTING)) w->failed = 1;
+    if (!w->failed && !MoveFileExA(w->temporary, path, MOVEFILE_REPLACE_EXISTING | MOVEFILE_WRITE_THROUGH)) w->failed = 1;
 #else
     if (!w->failed && rename(w->temporary, path) != 0) w->failed = 1;
 #endif
@@ -7844,7 +7966,348 @@ PTDEF pt_result pt_write_pfm_floats(const char *path, const float *rgb, int widt
     return pti_writer_close(&w, path);
 }
 
+/* A value as a code of 0..most with the sRGB transfer, as pt_srgb_byte does it. */
+static uint32_t pti_srgb_code(double linear, double most)
+{
+    double v = linear > 0 ? (linear < 1 ? linear : 1.0) : 0.0;
+    return (uint32_t)(most * pt_srgb_encode(v) + 0.5);
+}
+
+/* One row of a film as PPM; P3: one pixel a line. Returns how many bytes of `out`, 18 a pixel at most. */
+static size_t pti_ppm_row(const pt_film *film, int y, double exposure, pt_ppm_kind kind, char *out)
+{
+    size_t row = 3 * (size_t)film->width, k, n = 0;
+    int is_long = kind == PT_PPM_P6_16 || kind == PT_PPM_P3_16;
+    for (k = 0; k < row; k++) {
+        uint32_t code = pti_srgb_code(exposure * pti_film_value(film, 2, row * (size_t)y + k), is_long ? 65535 : 255);
+        if (kind == PT_PPM_P3 || kind == PT_PPM_P3_16) {
+            out[n] = 0;
+            pti_append_integer(out + n, 8, code);
+            n += strlen(out + n);
+            out[n++] = k % 3 == 2 ? '\n' : ' ';
+        } else {
+            if (is_long) out[n++] = (char)(unsigned char)(code >> 8);
+            out[n++] = (char)(unsigned char)(code & 255u);
+        }
+    }
+    return n;
+}
+
+PTDEF pt_result pt_write_ppm_as(const char *path, const pt_film *film, double exposure, pt_ppm_kind kind)
+{
+    char head[64] = "";
+    char *row;
+    pti_writer w;
+    int y;
+    if (!film->half[0] || !(exposure >= 0) || !pti_finite(exposure) || (int)kind < 0 || kind > PT_PPM_P3_16) return PT_ERROR_ARGUMENT;
+    row = (char *)pti_alloc((size_t)film->width, 18, film->alloc_user);
+    if (!row) return PT_ERROR_MEMORY;
+    if (!pti_writer_open(&w, path)) {
+        pti_free(row, film->alloc_user);
+        return PT_ERROR_FILE;
+    }
+    pti_append(head, sizeof head, kind == PT_PPM_P6 || kind == PT_PPM_P6_16 ? "P6\n" : "P3\n");
+    pti_append_integer(head, sizeof head, (uint64_t)film->width);
+    pti_append(head, sizeof head, " ");
+    pti_append_integer(head, sizeof head, (uint64_t)film->height);
+    pti_append(head, sizeof head, kind == PT_PPM_P6_16 || kind == PT_PPM_P3_16 ? "\n65535\n" : "\n255\n");
+    pti_write_text(&w, head);
+    for (y = 0; y < film->height; y++) pti_write(&w, row, pti_ppm_row(film, y, exposure, kind, row));
+    pti_free(row, film->alloc_user);
+    return pti_writer_close(&w, path);
+}
+
+/* --- films --- */
+
+static void pti_put_little(unsigned char *to, uint64_t v, int bytes)
+{
+    int k;
+    for (k = 0; k < bytes; k++) to[k] = (unsigned char)((v >> (8 * k)) & 255u);
+}
+
+static uint64_t pti_get_little(const unsigned char *from, int bytes)
+{
+    uint64_t v = 0;
+    int k;
+    for (k = 0; k < bytes; k++) v |= (uint64_t)from[k] << (8 * k);
+    return v;
+}
+
+/* A running CRC-64: a byte at a time with a table of what each byte does. */
+typedef struct pti_crc64 {
+    uint64_t sum, table[256];
+} pti_crc64;
+
+static void pti_crc64_start(pti_crc64 *c)
+{
+    int i, k;
+    for (i = 0; i < 256; i++) {
+        uint64_t v = (uint64_t)i;
+        for (k = 0; k < 8; k++) v = (v >> 1) ^ (0xc96c5795d7870f42u & (0u - (v & 1u)));
+        c->table[i] = v;
+    }
+    c->sum = UINT64_MAX;
+}
+
+static void pti_crc64_add(pti_crc64 *c, const unsigned char *data, size_t size)
+{
+    uint64_t sum = c->sum;
+    for (; size > 0; size--) sum = c->table[(sum ^ *data++) & 255u] ^ (sum >> 8);
+    c->sum = sum;
+}
+
+enum { PTI_FILM_HEAD = 64, PTI_FILM_FORMAT = 1, PTI_FILM_PLANES = 8, PTI_FILM_CLASSES = 1024, PTI_FILM_CHUNK = 4096 };
+
+/* Where the film keeps plane i, and how many values a pixel it has. */
+static double **pti_film_plane(pt_film *film, int i, size_t *channels)
+{
+    double **planes[PTI_FILM_PLANES] = {&film->half[0], &film->half[1], &film->splat[0], &film->splat[1],
+                                        &film->albedo,  &film->normal,  &film->depth,    &film->classes};
+    *channels = i == 7 ? 3 * (size_t)film->class_count : i == 6 ? 1 : 3;
+    return planes[i];
+}
+
+/* Bit i: plane i is there. */
+static uint32_t pti_film_planes(pt_film *film)
+{
+    uint32_t planes = 0;
+    size_t channels;
+    int i;
+    for (i = 0; i < PTI_FILM_PLANES; i++)
+        if (*pti_film_plane(film, i, &channels)) planes |= 1u << i;
+    return planes;
+}
+
+/* Can there be a film with these planes: both halves, all of albedo, normal and depth or none, classes if counted? */
+static int pti_film_planes_fit(const pt_film *film, uint32_t planes)
+{
+    uint32_t aov = planes & 0x70u;
+    return (planes & 3u) == 3u && planes < 1u << PTI_FILM_PLANES && (aov == 0 || aov == 0x70u) && film->class_count >= 0 &&
+           film->class_count <= PTI_FILM_CLASSES && (planes >> 7 != 0) == (film->class_count > 0);
+}
+
+/* Are the ranges disjoint and rising, with as many samples as the film counts? Without ranges any count will do. */
+static int pti_film_ranges_fit(const pt_film *film)
+{
+    uint64_t count = 0, last = 0;
+    uint32_t i;
+    for (i = 0; i < film->range_count; i++) {
+        const pt_range r = film->ranges[i];
+        if (r.begin >= r.end || (i > 0 && r.begin <= last)) return 0;
+        count += r.end - r.begin;
+        last = r.end;
+    }
+    return film->range_count == 0 || count == (uint64_t)film->samples[0] + film->samples[1];
+}
+
+/* Bytes of the file of such a film: below 2^48, as pictures have at most 2^32 pixels. */
+static uint64_t pti_film_file_size(pt_film *film, uint32_t planes)
+{
+    uint64_t pixels = (uint64_t)film->width * (uint64_t)film->height, size = PTI_FILM_HEAD + 8 * (uint64_t)film->range_count + 8;
+    size_t channels;
+    int i;
+    for (i = 0; i < PTI_FILM_PLANES; i++) {
+        pti_film_plane(film, i, &channels);
+        if (planes >> i & 1u) size += 8 * channels * pixels;
+    }
+    return size;
+}
+
+/* The head: 8 letters, of which the line end shows a transfer as text; version of the format; then how this build
+   calls itself, for whoever looks; planes; sizes; counts; the fingerprint. */
+static void pti_film_head(pt_film *film, unsigned char *b)
+{
+    memcpy(b, "ptfilm\r\n", 8);
+    pti_put_little(b + 8, PTI_FILM_FORMAT, 4);
+    pti_put_little(b + 12, sizeof(pt_real), 4);
+    pti_put_little(b + 16, PT_VERSION_MAJOR << 16 | PT_VERSION_MINOR << 8 | PT_VERSION_PATCH, 4);
+    pti_put_little(b + 20, pti_film_planes(film), 4);
+    pti_put_little(b + 24, (uint64_t)film->width, 4);
+    pti_put_little(b + 28, (uint64_t)film->height, 4);
+    pti_put_little(b + 32, (uint64_t)film->class_count, 4);
+    pti_put_little(b + 36, film->range_count, 4);
+    pti_put_little(b + 40, film->samples[0], 4);
+    pti_put_little(b + 44, film->samples[1], 4);
+    pti_put_little(b + 48, film->fingerprint, 8);
+    pti_put_little(b + 56, film->nonfinite, 8);
+}
+
+static void pti_film_put(pti_writer *w, pti_crc64 *crc, const unsigned char *data, size_t size)
+{
+    pti_crc64_add(crc, data, size);
+    pti_write(w, data, size);
+}
+
+static void pti_film_put_doubles(pti_writer *w, pti_crc64 *crc, const double *values, size_t count)
+{
+    unsigned char chunk[PTI_FILM_CHUNK];
+    while (count > 0) {
+        size_t n = count < PTI_FILM_CHUNK / 8 ? count : (size_t)PTI_FILM_CHUNK / 8, k;
+        for (k = 0; k < n; k++) {
+            uint64_t bits;
+            memcpy(&bits, &values[k], 8);
+            pti_put_little(chunk + 8 * k, bits, 8);
+        }
+        pti_film_put(w, crc, chunk, 8 * n);
+        values += n;
+        count -= n;
+    }
+}
+
+PTDEF pt_result pt_film_write(const char *path, const pt_film *film)
+{
+    pt_film f = *film; /* the same arrays, for reading */
+    size_t pixels = (size_t)f.width * (size_t)f.height, channels;
+    unsigned char b[PTI_FILM_HEAD];
+    pti_crc64 crc;
+    pti_writer w;
+    uint32_t i;
+    int k;
+    if (!f.half[0] || !pti_film_planes_fit(&f, pti_film_planes(&f)) || !pti_film_ranges_fit(&f)) return PT_ERROR_ARGUMENT;
+    if (!pti_writer_open(&w, path)) return PT_ERROR_FILE;
+    pti_crc64_start(&crc);
+    pti_film_head(&f, b);
+    pti_film_put(&w, &crc, b, PTI_FILM_HEAD);
+    for (i = 0; i < f.range_count; i++) {
+        pti_put_little(b, f.ranges[i].begin, 4);
+        pti_put_little(b + 4, f.ranges[i].end, 4);
+        pti_film_put(&w, &crc, b, 8);
+    }
+    for (k = 0; k < PTI_FILM_PLANES; k++) {
+        const double *values = *pti_film_plane(&f, k, &channels);
+        if (values) pti_film_put_doubles(&w, &crc, values, pixels * channels);
+    }
+    pti_put_little(b, ~crc.sum, 8);
+    pti_write(&w, b, 8);
+    return pti_writer_close(&w, path);
+}
+
 /* --- reading --- */
+
+/* Bytes of an open file, -1 if it has no size (a pipe, say); what is read next is its first byte. */
+static int64_t pti_file_size(FILE *file)
+{
+    int64_t size = -1;
+#if defined(_WIN32)
+    if (_fseeki64(file, 0, SEEK_END) == 0) size = _ftelli64(file);
+#else
+    if (fseek(file, 0, SEEK_END) == 0) size = (int64_t)ftell(file);
+#endif
+    rewind(file);
+    return size;
+}
+
+/* Does the file end with the CRC-64 of all that stands before? */
+static int pti_film_is_whole(FILE *file, uint64_t size)
+{
+    unsigned char chunk[PTI_FILM_CHUNK];
+    pti_crc64 crc;
+    pti_crc64_start(&crc);
+    for (size -= 8; size > 0;) {
+        size_t n = size < PTI_FILM_CHUNK ? (size_t)size : (size_t)PTI_FILM_CHUNK;
+        if (fread(chunk, 1, n, file) != n) return 0;
+        pti_crc64_add(&crc, chunk, n);
+        size -= n;
+    }
+    return fread(chunk, 1, 8, file) == 8 && pti_get_little(chunk, 8) == ~crc.sum;
+}
+
+static int pti_film_get_doubles(FILE *file, double *values, size_t count)
+{
+    unsigned char chunk[PTI_FILM_CHUNK];
+    while (count > 0) {
+        size_t n = count < PTI_FILM_CHUNK / 8 ? count : (size_t)PTI_FILM_CHUNK / 8, k;
+        if (fread(chunk, 8, n, file) != n) return 0;
+        for (k = 0; k < n; k++) {
+            uint64_t bits = pti_get_little(chunk + 8 * k, 8);
+            memcpy(&values[k], &bits, 8);
+        }
+        values += n;
+        count -= n;
+    }
+    return 1;
+}
+
+/* An empty film with the planes, and room for the ranges, of the one that `head` tells of. */
+static pt_result pti_film_make_planes(pt_film *film, const pt_film *head, uint32_t planes)
+{
+    pt_result result = pt_film_make(film, head->width, head->height, (planes & 0x70u) != 0);
+    int h;
+    for (h = 0; h < 2; h++)
+        if (result == PT_OK && (planes >> (2 + h) & 1u) && !pti_film_need_splat(film, h)) result = PT_ERROR_MEMORY;
+    if (result == PT_OK && head->class_count > 0) result = pt_film_make_classes(film, head->class_count);
+    if (result == PT_OK && !pti_reserve(&film->ranges, &film->range_capacity, head->range_count, sizeof *film->ranges, film->alloc_user))
+        result = PT_ERROR_MEMORY;
+    return result;
+}
+
+static int pti_film_get_ranges(FILE *file, pt_film *film, uint32_t count)
+{
+    unsigned char b[8];
+    for (film->range_count = 0; film->range_count < count; film->range_count++) {
+        if (fread(b, 1, 8, file) != 8) return 0;
+        film->ranges[film->range_count].begin = (uint32_t)pti_get_little(b, 4);
+        film->ranges[film->range_count].end = (uint32_t)pti_get_little(b + 4, 4);
+    }
+    return pti_film_ranges_fit(film);
+}
+
+/* The fields of a head; 0: no film has such ones. */
+static int pti_film_parse_head(pt_film *head, const unsigned char *b, uint32_t *planes)
+{
+    memset(head, 0, sizeof *head);
+    *planes = (uint32_t)pti_get_little(b + 20, 4);
+    if (pti_get_little(b + 24, 4) > 65536 || pti_get_little(b + 28, 4) > 65536 || pti_get_little(b + 32, 4) > PTI_FILM_CLASSES) return 0;
+    head->width = (int)pti_get_little(b + 24, 4);
+    head->height = (int)pti_get_little(b + 28, 4);
+    head->class_count = (int)pti_get_little(b + 32, 4);
+    head->range_count = (uint32_t)pti_get_little(b + 36, 4);
+    head->samples[0] = (uint32_t)pti_get_little(b + 40, 4);
+    head->samples[1] = (uint32_t)pti_get_little(b + 44, 4);
+    head->fingerprint = pti_get_little(b + 48, 8);
+    head->nonfinite = pti_get_little(b + 56, 8);
+    return pti_pixels_fit(head->width, head->height) && pti_film_planes_fit(head, *planes);
+}
+
+static pt_result pti_film_read(FILE *file, pt_film *film)
+{
+    unsigned char b[PTI_FILM_HEAD];
+    int64_t size = pti_file_size(file);
+    pt_film head;
+    size_t channels;
+    uint32_t planes;
+    pt_result result;
+    int k;
+    if (size < PTI_FILM_HEAD + 8 || fread(b, 1, PTI_FILM_HEAD, file) != PTI_FILM_HEAD || memcmp(b, "ptfilm\r\n", 8) != 0) return PT_ERROR_FILE;
+    rewind(file);
+    if (!pti_film_is_whole(file, (uint64_t)size)) return PT_ERROR_FILE;
+    if (pti_get_little(b + 8, 4) != PTI_FILM_FORMAT) return PT_ERROR_MISMATCH;
+    if (!pti_film_parse_head(&head, b, &planes) || pti_film_file_size(&head, planes) != (uint64_t)size) return PT_ERROR_FILE;
+    result = pti_film_make_planes(film, &head, planes);
+    if (result != PT_OK) return result;
+    film->samples[0] = head.samples[0];
+    film->samples[1] = head.samples[1];
+    film->fingerprint = head.fingerprint;
+    film->nonfinite = head.nonfinite;
+    if (fseek(file, PTI_FILM_HEAD, SEEK_SET) != 0 || !pti_film_get_ranges(file, film, head.range_count)) return PT_ERROR_FILE;
+    for (k = 0; k < PTI_FILM_PLANES; k++) {
+        double *values = *pti_film_plane(film, k, &channels);
+        if (values && !pti_film_get_doubles(file, values, (size_t)film->width * (size_t)film->height * channels)) return PT_ERROR_FILE;
+    }
+    return PT_OK;
+}
+
+PTDEF pt_result pt_film_read(const char *path, pt_film *film)
+{
+    pt_result result = PT_ERROR_FILE;
+    FILE *file = path ? fopen(path, "rb") : NULL;
+    pt_film_free(film);
+    if (!file) return result;
+    result = pti_film_read(file, film);
+    fclose(file);
+    if (result != PT_OK) pt_film_free(film);
+    return result;
+}
 
 PTDEF void pt_image_free(pt_image *image)
 {
