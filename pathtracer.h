@@ -8309,102 +8309,6 @@ PTDEF pt_result pt_film_read(const char *path, pt_film *film)
     return result;
 }
 
-PTDEF void pt_image_free(pt_image *image)
-{
-    pti_free(image->rgb, image->alloc_user);
-    image->rgb = NULL;
-    image->width = image->height = 0;
-}
-
-/* The next word of a PNM header: blanks and comments before it are skipped, one blank after it is taken. 0: none, or
-   too long. */
-static int pti_read_word(FILE *file, char *word, size_t size)
-{
-    size_t n = 0;
-    int c = fgetc(file);
-    while (c == ' ' || c == '\t' || c == '\r' || c == '\n' || c == '#') {
-        if (c == '#')
-            while (c != '\n' && c != EOF) c = fgetc(file);
-        c = fgetc(file);
-    }
-    for (; c != EOF && c != ' ' && c != '\t' && c != '\r' && c != '\n'; c = fgetc(file)) {
-        if (n + 1 >= size) return 0;
-        word[n++] = (char)c;
-    }
-    word[n] = 0;
-    return n > 0;
-}
-
-/* A whole number of at most 6 digits; -1: it is none. */
-static int pti_read_count(FILE *file)
-{
-    char word[8];
-    int value = 0, i;
-    if (!pti_read_word(file, word, sizeof word) || strlen(word) > 6) return -1;
-    for (i = 0; word[i]; i++) {
-        if (word[i] < '0' || word[i] > '9') return -1;
-        value = 10 * value + (word[i] - '0');
-    }
-    return value;
-}
-
-/* The pixels after the header; `kind`: 0 = bytes, 1 = floats little-endian, 2 = big-endian. */
-static int pti_read_pixels(FILE *file, pt_image *image, int kind)
-{
-    size_t row = 3 * (size_t)image->width, i;
-    int y, k;
-    for (y = 0; y < image->height; y++) {
-        float *to = image->rgb + row * (size_t)(kind ? image->height - 1 - y : y); /* PFM begins at the bottom */
-        for (i = 0; i < row; i++) {
-            unsigned char b[4];
-            uint32_t bits = 0;
-            if (fread(b, 1, kind ? 4 : 1, file) != (size_t)(kind ? 4 : 1)) return 0;
-            for (k = 0; kind && k < 4; k++) bits |= (uint32_t)b[kind == 1 ? k : 3 - k] << (8 * k);
-            if (kind) memcpy(&to[i], &bits, 4);
-            else to[i] = (float)pt_srgb_decode(b[0] / 255.0);
-        }
-    }
-    return 1;
-}
-
-/* Is this the scale of a PFM: a number that is not 0? Its sign tells the byte order, its size nothing. */
-static int pti_is_scale(const char *word)
-{
-    return strspn(word, "+-.0123456789eE") == strlen(word) && strcspn(word, "123456789") < strcspn(word, "eE");
-}
-
-static pt_result pti_read_image(FILE *file, pt_image *image)
-{
-    char word[32];
-    int kind = -1, width, height;
-    if (!pti_read_word(file, word, sizeof word)) return PT_ERROR_FILE;
-    if (strcmp(word, "P6") == 0) kind = 0;
-    if (strcmp(word, "PF") == 0) kind = 1;
-    width = pti_read_count(file);
-    height = pti_read_count(file);
-    if (kind < 0 || !pti_pixels_fit(width, height) || !pti_read_word(file, word, sizeof word)) return PT_ERROR_FILE;
-    if (kind == 0 && strcmp(word, "255") != 0) return PT_ERROR_FILE;
-    if (kind == 1 && !pti_is_scale(word)) return PT_ERROR_FILE;
-    if (kind == 1 && word[0] != '-') kind = 2;
-    image->rgb = (float *)pti_alloc(3 * (size_t)width * (size_t)height, sizeof *image->rgb, image->alloc_user);
-    if (!image->rgb) return PT_ERROR_MEMORY;
-    image->width = width;
-    image->height = height;
-    return pti_read_pixels(file, image, kind) ? PT_OK : PT_ERROR_FILE;
-}
-
-PTDEF pt_result pt_read_image(const char *path, pt_image *image)
-{
-    pt_result result = PT_ERROR_FILE;
-    FILE *file = path ? fopen(path, "rb") : NULL;
-    pt_image_free(image);
-    if (!file) return result;
-    result = pti_read_image(file, image);
-    fclose(file);
-    if (result != PT_OK) pt_image_free(image);
-    return result;
-}
-
 #if PTI_HAS_MEASURED
 static const unsigned char pti_merl_head[12] = {90, 0, 0, 0, 90, 0, 0, 0, 180, 0, 0, 0};
 
@@ -8445,8 +8349,7 @@ static int pti_merl_read_values(FILE *file, double *value)
 PTDEF pt_result pt_measured_read(const char *path, pt_measured *m)
 {
     FILE *file = path ? fopen(path, "rb") : NULL;
-    pt_result result = pti_merl_make(m);
-    if (!file) result = PT_ERROR_FILE;
+    pt_result result = file && pti_file_size(file) >= 12 + 24 * (int64_t)PT_MEASURED_CELLS ? pti_merl_make(m) : PT_ERROR_FILE;
     if (result == PT_OK && !pti_merl_read_values(file, m->value)) result = PT_ERROR_FILE;
     if (file) fclose(file);
     if (result == PT_OK) pti_merl_finish(m);
@@ -8535,8 +8438,15 @@ static void pti_deflate(pti_bits *b, const unsigned char *data, size_t size, siz
     if (b->count > 0) pti_put_bits(b, 0, 8 - b->count);
 }
 
-/* One row through PNG filter 4: each byte less the neighbour (left a, above p, above left c) that is nearest
-   to a + p - c (Paeth). out: the filter's number and 3 * width bytes. */
+/* The neighbour (left a, above p, above left c) that is nearest to a + p - c (Paeth). */
+static int pti_paeth(int a, int p, int c)
+{
+    int da = p > c ? p - c : c - p, dp = a > c ? a - c : c - a, dc = a + p - 2 * c;
+    if (dc < 0) dc = -dc;
+    return (da <= dp && da <= dc ? a : dp <= dc ? p : c);
+}
+
+/* One row through PNG filter 4: each byte less that neighbour. out: the filter's number and 3 * width bytes. */
 static void pti_png_row(const unsigned char *rgb, int width, int y, unsigned char *out)
 {
     size_t stride = 3 * (size_t)width, k;
@@ -8544,20 +8454,20 @@ static void pti_png_row(const unsigned char *rgb, int width, int y, unsigned cha
     out[0] = 4;
     for (k = 0; k < stride; k++) {
         int a = k < 3 ? 0 : row[k - 3], p = y == 0 ? 0 : row[k - stride], c = y == 0 || k < 3 ? 0 : row[k - stride - 3];
-        int da = p > c ? p - c : c - p, dp = a > c ? a - c : c - a, dc = a + p - 2 * c;
-        if (dc < 0) dc = -dc;
-        out[1 + k] = (unsigned char)(row[k] - (da <= dp && da <= dc ? a : dp <= dc ? p : c));
+        out[1 + k] = (unsigned char)(row[k] - pti_paeth(a, p, c));
     }
 }
 
+/* Four bits at a time: what each of the 16 does to the rest. */
 static uint32_t pti_crc32(uint32_t crc, const unsigned char *data, size_t size)
 {
+    static const uint32_t table[16] = {0x00000000, 0x1db71064, 0x3b6e20c8, 0x26d930ac, 0x76dc4190, 0x6b6b51f4, 0x4db26158, 0x5005713c,
+                                       0xedb88320, 0xf00f9344, 0xd6d6a3e8, 0xcb61b38c, 0x9b64c2b0, 0x86d3d2d4, 0xa00ae278, 0xbdbdf21c};
     size_t i;
-    int k;
     crc = ~crc;
     for (i = 0; i < size; i++) {
-        crc ^= data[i];
-        for (k = 0; k < 8; k++) crc = (crc >> 1) ^ (0xedb88320u & (0u - (crc & 1u)));
+        crc = table[(crc ^ data[i]) & 15u] ^ (crc >> 4);
+        crc = table[(crc ^ (uint32_t)data[i] >> 4) & 15u] ^ (crc >> 4);
     }
     return ~crc;
 }
@@ -8580,6 +8490,8 @@ static void pti_big_endian(unsigned char *p, uint32_t v)
     p[2] = (unsigned char)((v >> 8) & 255u);
     p[3] = (unsigned char)(v & 255u);
 }
+
+static const unsigned char pti_png_signature[8] = {137, 80, 78, 71, 13, 10, 26, 10};
 
 static void pti_png_chunk(pti_writer *w, const char *type, const unsigned char *data, size_t size)
 {
@@ -8618,7 +8530,6 @@ static int pti_png_compress(const unsigned char *rgb, int width, int height, voi
 
 static pt_result pti_write_png(const char *path, const unsigned char *rgb, int width, int height, void *user)
 {
-    static const unsigned char signature[8] = {137, 80, 78, 71, 13, 10, 26, 10};
     unsigned char header[13] = {0, 0, 0, 0, 0, 0, 0, 0, 8, 2, 0, 0, 0}; /* 8 bits, RGB */
     pti_writer w;
     pti_bits b;
@@ -8631,7 +8542,7 @@ static pt_result pti_write_png(const char *path, const unsigned char *rgb, int w
     }
     pti_big_endian(header, (uint32_t)width);
     pti_big_endian(header + 4, (uint32_t)height);
-    pti_write(&w, signature, 8);
+    pti_write(&w, pti_png_signature, 8);
     pti_png_chunk(&w, "IHDR", header, 13);
     pti_png_chunk(&w, "IDAT", b.data, b.size);
     pti_png_chunk(&w, "IEND", header, 0);
@@ -8687,6 +8598,508 @@ PTDEF pt_result pt_write_pfm(const char *path, const pt_film *film)
     for (k = 0; k < n; k++) rgb[k] = (float)pti_film_value(film, 2, k);
     result = pt_write_pfm_floats(path, rgb, film->width, film->height);
     pti_free(rgb, film->alloc_user);
+    return result;
+}
+
+/* --- pictures, reading --- */
+
+/* A whole file in memory, with a 0 behind it. PT_ERROR_FILE: it cannot be read; PT_ERROR_ARGUMENT: it is beyond 2 GiB. */
+static pt_result pti_read_file(const char *path, void *user, unsigned char **bytes, size_t *size)
+{
+    FILE *file = path ? fopen(path, "rb") : NULL;
+    int64_t n = file ? pti_file_size(file) : -1;
+    pt_result result = n < 0 ? PT_ERROR_FILE : n > 0x7fffffff ? PT_ERROR_ARGUMENT : PT_OK;
+    *bytes = NULL;
+    *size = result == PT_OK ? (size_t)n : 0;
+    if (result == PT_OK) {
+        *bytes = (unsigned char *)pti_alloc(*size + 1, 1, user);
+        result = *bytes ? PT_OK : PT_ERROR_MEMORY;
+    }
+    if (result == PT_OK) {
+        if (fread(*bytes, 1, *size, file) != *size) result = PT_ERROR_FILE;
+        (*bytes)[*size] = 0;
+    }
+    if (file) fclose(file);
+    if (result != PT_OK) pti_free(*bytes, user);
+    return result;
+}
+
+PTDEF void pt_image_free(pt_image *image)
+{
+    pti_free(image->rgb, image->alloc_user);
+    image->rgb = NULL;
+    image->width = image->height = 0;
+}
+
+/* Asks for the memory of a picture. */
+static pt_result pti_image_make(pt_image *image, int width, int height)
+{
+    image->rgb = (float *)pti_alloc(3 * (size_t)width * (size_t)height, sizeof *image->rgb, image->alloc_user);
+    if (!image->rgb) return PT_ERROR_MEMORY;
+    image->width = width;
+    image->height = height;
+    return PT_OK;
+}
+
+/* Codes 0..most of the sRGB curve to linear light: from a table where that is short. */
+typedef struct pti_levels {
+    uint32_t most;
+    float value[256];
+} pti_levels;
+
+static void pti_levels_make(pti_levels *l, uint32_t most)
+{
+    uint32_t i;
+    l->most = most;
+    for (i = 0; i < 256 && i <= most; i++) l->value[i] = (float)pt_srgb_decode(i / (double)most);
+}
+
+static float pti_level(const pti_levels *l, uint32_t code)
+{
+    return code < 256 ? l->value[code] : (float)pt_srgb_decode(code / (double)l->most);
+}
+
+/* What is left of a file. */
+typedef struct pti_bytes {
+    const unsigned char *at, *end;
+} pti_bytes;
+
+static int pti_next_byte(pti_bytes *b)
+{
+    return b->at < b->end ? *b->at++ : -1;
+}
+
+static int pti_is_blank(int c)
+{
+    return c == ' ' || c == '\t' || c == '\r' || c == '\n';
+}
+
+/* The next word of a PNM file: blanks and comments before it are skipped, one blank after it is taken. 0: none, or too
+   long. */
+static int pti_read_word(pti_bytes *b, char *word, size_t size)
+{
+    size_t n = 0;
+    int c = pti_next_byte(b);
+    for (; pti_is_blank(c) || c == '#'; c = pti_next_byte(b))
+        if (c == '#')
+            while (c != '\n' && c >= 0) c = pti_next_byte(b);
+    for (; c >= 0 && !pti_is_blank(c); c = pti_next_byte(b)) {
+        if (n + 1 >= size) return 0;
+        word[n++] = (char)c;
+    }
+    word[n] = 0;
+    return n > 0;
+}
+
+/* A whole number of at most 6 digits; -1: it is none. */
+static int pti_read_count(pti_bytes *b)
+{
+    char word[8];
+    int value = 0, i;
+    if (!pti_read_word(b, word, sizeof word) || strlen(word) > 6) return -1;
+    for (i = 0; word[i]; i++) {
+        if (word[i] < '0' || word[i] > '9') return -1;
+        value = 10 * value + (word[i] - '0');
+    }
+    return value;
+}
+
+/* P6 or P3 after these letters. A value has at least 1 byte, 2 as text or if it can be above 255. */
+static pt_result pti_read_ppm(pti_bytes *b, pt_image *image, int is_text)
+{
+    int width = pti_read_count(b), height = pti_read_count(b), most = pti_read_count(b), code = 0, bytes = is_text || most > 255 ? 2 : 1;
+    size_t count, k;
+    pti_levels levels;
+    pt_result result;
+    if (!pti_pixels_fit(width, height) || most < 1 || most > 65535) return PT_ERROR_FILE;
+    count = 3 * (size_t)width * (size_t)height;
+    if (((size_t)(b->end - b->at) + (size_t)is_text) / (size_t)bytes < count) return PT_ERROR_FILE;
+    result = pti_image_make(image, width, height);
+    if (result != PT_OK) return result;
+    pti_levels_make(&levels, (uint32_t)most);
+    for (k = 0; k < count; k++) {
+        if (is_text) code = pti_read_count(b);
+        else code = bytes == 1 ? b->at[k] : b->at[2 * k] << 8 | b->at[2 * k + 1];
+        if (code < 0 || code > most) return PT_ERROR_FILE;
+        image->rgb[k] = pti_level(&levels, (uint32_t)code);
+    }
+    return PT_OK;
+}
+
+/* Is this the scale of a PFM: a number that is not 0? Its sign tells the byte order, its size nothing. */
+static int pti_is_scale(const char *word)
+{
+    return strspn(word, "+-.0123456789eE") == strlen(word) && strcspn(word, "123456789") < strcspn(word, "eE");
+}
+
+/* PF after these letters. */
+static pt_result pti_read_pfm(pti_bytes *b, pt_image *image)
+{
+    char word[32];
+    int width = pti_read_count(b), height = pti_read_count(b), y, k;
+    size_t row, i;
+    pt_result result;
+    if (!pti_pixels_fit(width, height) || !pti_read_word(b, word, sizeof word) || !pti_is_scale(word)) return PT_ERROR_FILE;
+    row = 3 * (size_t)width;
+    if ((size_t)(b->end - b->at) / 4 / row < (size_t)height) return PT_ERROR_FILE;
+    result = pti_image_make(image, width, height);
+    for (y = 0; result == PT_OK && y < height; y++) {
+        float *to = image->rgb + row * (size_t)(height - 1 - y); /* PFM begins at the bottom */
+        for (i = 0; i < row; i++, b->at += 4) {
+            uint32_t bits = 0;
+            for (k = 0; k < 4; k++) bits |= (uint32_t)b->at[word[0] == '-' ? k : 3 - k] << (8 * k);
+            memcpy(&to[i], &bits, 4);
+        }
+    }
+    return result;
+}
+
+/* --- PNG, reading: any deflate stream, by canonical Huffman codes --- */
+
+/* A Huffman code as a table: the next `longest` bits are the index of symbol * 16 + length of its code; 0: no code. */
+typedef struct pti_huffman {
+    int longest;
+    uint16_t entry[32768];
+} pti_huffman;
+
+/* What is read and what is made of it. */
+typedef struct pti_inflater {
+    const unsigned char *in, *end;
+    uint64_t buffer;
+    int count, missing;     /* bits in the buffer; bytes asked for beyond the end                          */
+    unsigned char *out;
+    size_t made, size;
+    pti_huffman literal, distance;
+} pti_inflater;
+
+/* The next bits, at most 32, least significant first; beyond the end they are 0. */
+static uint32_t pti_peek_bits(pti_inflater *s, int count)
+{
+    while (s->count < count) {
+        if (s->in < s->end) s->buffer |= (uint64_t)*s->in++ << s->count;
+        else s->missing++;
+        s->count += 8;
+    }
+    return (uint32_t)(s->buffer & (((uint64_t)1 << count) - 1));
+}
+
+static uint32_t pti_take_bits(pti_inflater *s, int count)
+{
+    uint32_t bits = pti_peek_bits(s, count);
+    s->buffer >>= count;
+    s->count -= count;
+    return bits;
+}
+
+/* The table of a code from the lengths of its words [RFC 1951 3.2.2]; 0: there cannot be so many short ones. */
+static int pti_huffman_make(pti_huffman *h, const unsigned char *lengths, int symbols)
+{
+    uint32_t count[16] = {0}, next[16] = {0}, k;
+    int i, l;
+    for (i = 0; i < symbols; i++) count[lengths[i]]++;
+    count[0] = 0;
+    for (h->longest = 0, l = 1; l < 16; l++) {
+        next[l] = (next[l - 1] + count[l - 1]) << 1;
+        if (next[l] + count[l] > 1u << l) return 0;
+        if (count[l] > 0) h->longest = l;
+    }
+    memset(h->entry, 0, sizeof h->entry[0] << h->longest);
+    for (i = 0; i < symbols; i++) {
+        l = lengths[i];
+        if (l == 0) continue;
+        for (k = pti_reverse_bits(next[l]++) >> (32 - l); k < 1u << h->longest; k += 1u << l) h->entry[k] = (uint16_t)(i << 4 | l);
+    }
+    return 1;
+}
+
+/* The next symbol, -1: none has such a code. */
+static int pti_take_symbol(pti_inflater *s, const pti_huffman *h)
+{
+    int entry = h->entry[pti_peek_bits(s, h->longest)];
+    pti_take_bits(s, entry & 15);
+    return entry ? entry >> 4 : -1;
+}
+
+/* A repetition [RFC 1951 3.2.5]; see pti_put_match. */
+static int pti_inflate_match(pti_inflater *s, int code)
+{
+    int extra = code < 8 || code == 28 ? 0 : code / 4 - 1, d;
+    size_t length, distance, k;
+    length = code == 28 ? 258 : code < 8 ? (size_t)code + 3 : 3 + ((size_t)(4 + code % 4) << extra);
+    length += pti_take_bits(s, extra);
+    d = pti_take_symbol(s, &s->distance);
+    extra = d < 4 ? 0 : d / 2 - 1;
+    if (code > 28 || d < 0 || d > 29) return 0;
+    distance = d < 4 ? (size_t)d + 1 : 1 + ((size_t)(2 + d % 2) << extra);
+    distance += pti_take_bits(s, extra);
+    if (distance > s->made || length > s->size - s->made) return 0;
+    for (k = 0; k < length; k++) s->out[s->made + k] = s->out[s->made + k - distance];
+    s->made += length;
+    return 1;
+}
+
+/* The symbols of a block. Where the input has ended it ends too, as nothing but zeros follows. */
+static int pti_inflate_symbols(pti_inflater *s)
+{
+    int symbol;
+    while ((symbol = pti_take_symbol(s, &s->literal)) != 256) {
+        if (symbol < 0 || s->missing > 8) return 0;
+        if (symbol > 256) {
+            if (!pti_inflate_match(s, symbol - 257)) return 0;
+        } else {
+            if (s->made == s->size) return 0;
+            s->out[s->made++] = (unsigned char)symbol;
+        }
+    }
+    return 1;
+}
+
+static int pti_inflate_stored(pti_inflater *s)
+{
+    uint32_t length, complement;
+    pti_take_bits(s, s->count % 8);
+    length = pti_take_bits(s, 16);
+    complement = pti_take_bits(s, 16);
+    if (length != (complement ^ 0xffffu) || length > s->size - s->made) return 0;
+    for (; length > 0 && s->missing == 0; length--) s->out[s->made++] = (unsigned char)pti_take_bits(s, 8);
+    return s->missing == 0;
+}
+
+/* The codes that a block brings: the lengths of their words, themselves coded [RFC 1951 3.2.7]. */
+static int pti_inflate_codes(pti_inflater *s)
+{
+    static const unsigned char order[19] = {16, 17, 18, 0, 8, 7, 9, 6, 10, 5, 11, 4, 12, 3, 13, 2, 14, 1, 15};
+    unsigned char lengths[320] = {0};
+    int literals = (int)pti_take_bits(s, 5) + 257, distances = (int)pti_take_bits(s, 5) + 1, codes = (int)pti_take_bits(s, 4) + 4, i;
+    for (i = 0; i < codes; i++) lengths[order[i]] = (unsigned char)pti_take_bits(s, 3);
+    if (!pti_huffman_make(&s->literal, lengths, 19)) return 0;
+    memset(lengths, 0, sizeof lengths);
+    for (i = 0; i < literals + distances;) {
+        int symbol = pti_take_symbol(s, &s->literal), times = 1, value = symbol;
+        if (symbol < 0 || (symbol == 16 && i == 0)) return 0;
+        if (symbol == 16) times = 3 + (int)pti_take_bits(s, 2);
+        if (symbol == 17) times = 3 + (int)pti_take_bits(s, 3);
+        if (symbol == 18) times = 11 + (int)pti_take_bits(s, 7);
+        if (symbol >= 16) value = symbol == 16 ? lengths[i - 1] : 0;
+        if (times > literals + distances - i) return 0;
+        for (; times > 0; times--) lengths[i++] = (unsigned char)value;
+    }
+    return pti_huffman_make(&s->literal, lengths, literals) && pti_huffman_make(&s->distance, lengths + literals, distances);
+}
+
+/* The fixed codes [RFC 1951 3.2.6]. */
+static int pti_inflate_fixed(pti_inflater *s)
+{
+    unsigned char lengths[288];
+    int i;
+    for (i = 0; i < 288; i++) lengths[i] = i < 144 ? 8 : i < 256 ? 9 : i < 280 ? 7 : 8;
+    if (!pti_huffman_make(&s->literal, lengths, 288)) return 0;
+    memset(lengths, 5, 32);
+    return pti_huffman_make(&s->distance, lengths, 32);
+}
+
+/* A zlib stream [RFC 1950] that must make exactly s->size bytes with the right checksum. */
+static int pti_inflate(pti_inflater *s)
+{
+    uint32_t method = pti_take_bits(s, 8), flags = pti_take_bits(s, 8), last = 0, sum = 0;
+    int k;
+    if ((method & 15u) != 8 || method >> 4 > 7 || (method << 8 | flags) % 31 != 0 || (flags & 32u)) return 0;
+    while (!last) {
+        uint32_t kind;
+        last = pti_take_bits(s, 1);
+        kind = pti_take_bits(s, 2);
+        if (kind == 3 || (kind == 0 && !pti_inflate_stored(s))) return 0;
+        if (kind == 1 && !pti_inflate_fixed(s)) return 0;
+        if (kind == 2 && !pti_inflate_codes(s)) return 0;
+        if (kind > 0 && !pti_inflate_symbols(s)) return 0;
+    }
+    pti_take_bits(s, s->count % 8);
+    for (k = 0; k < 4; k++) sum = sum << 8 | pti_take_bits(s, 8);
+    return s->missing == 0 && s->made == s->size && sum == pti_adler32(s->out, s->size);
+}
+
+/* The head of a PNG, its palette, and its compressed data. */
+typedef struct pti_png {
+    uint32_t width, height;
+    int depth, type, channels, is_interlaced;
+    unsigned char palette[768];
+    uint32_t colours;
+    size_t size;
+} pti_png;
+
+static uint32_t pti_from_big_endian(const unsigned char *p)
+{
+    return (uint32_t)p[0] << 24 | (uint32_t)p[1] << 16 | (uint32_t)p[2] << 8 | p[3];
+}
+
+/* Colour types: 0 grey, 2 RGB, 3 palette, 4 grey and alpha, 6 RGB and alpha, each with its depths. */
+static int pti_png_head(pti_png *p, const unsigned char *d, uint32_t length)
+{
+    static const int channels[7] = {1, 0, 3, 1, 2, 0, 4};
+    if (length != 13 || p->depth != 0 || d[9] > 6 || d[10] != 0 || d[11] != 0 || d[12] > 1) return 0;
+    p->width = pti_from_big_endian(d);
+    p->height = pti_from_big_endian(d + 4);
+    p->depth = d[8];
+    p->type = d[9];
+    p->channels = channels[p->type];
+    p->is_interlaced = d[12];
+    if (p->width > 65536 || p->height > 65536 || !pti_pixels_fit((int)p->width, (int)p->height) || p->channels == 0) return 0;
+    if (p->depth == 8) return 1;
+    if (p->depth == 16) return p->type != 3;
+    return (p->depth == 1 || p->depth == 2 || p->depth == 4) && (p->type == 0 || p->type == 3);
+}
+
+/* Reads the chunks; compressed data is moved together to the beginning of the file's bytes. */
+static int pti_png_chunks(pti_png *p, unsigned char *file, size_t size)
+{
+    size_t at = 8;
+    memset(p, 0, sizeof *p);
+    for (;;) {
+        unsigned char *chunk = file + at, *d = chunk + 8;
+        uint32_t length = size - at < 12 ? UINT32_MAX : pti_from_big_endian(chunk);
+        if (length > size - at || length + 12 > size - at || pti_crc32(0, chunk + 4, length + 4) != pti_from_big_endian(d + length)) return 0;
+        if (memcmp(chunk + 4, "IHDR", 4) == 0) {
+            if (!pti_png_head(p, d, length)) return 0;
+        } else if (p->depth == 0) {
+            return 0; /* it must be the first */
+        } else if (memcmp(chunk + 4, "PLTE", 4) == 0) {
+            if (length % 3 != 0 || length > 768 || length == 0) return 0;
+            memcpy(p->palette, d, length);
+            p->colours = length / 3;
+        } else if (memcmp(chunk + 4, "IDAT", 4) == 0) {
+            memmove(file + p->size, d, length);
+            p->size += length;
+        } else if (memcmp(chunk + 4, "IEND", 4) == 0) {
+            return 1;
+        } else if (!(chunk[4] & 32)) {
+            return 0; /* needed for display, says its first letter */
+        }
+        at += 12 + (size_t)length;
+    }
+}
+
+/* A picture of every dx-th column and dy-th row; an interlaced PNG has seven. */
+typedef struct pti_png_pass {
+    uint32_t x, y, dx, dy, width, height;
+    size_t row;              /* bytes                                                                      */
+} pti_png_pass;
+
+static pti_png_pass pti_png_pass_make(const pti_png *p, int k)
+{
+    static const unsigned char x[7] = {0, 4, 0, 2, 0, 1, 0}, y[7] = {0, 0, 4, 0, 2, 0, 1}, dx[7] = {8, 8, 4, 4, 2, 2, 1}, dy[7] = {8, 8, 8, 4, 4, 2, 2};
+    pti_png_pass s = {0, 0, 1, 1, 0, 0, 0};
+    if (p->is_interlaced) {
+        s.x = x[k];
+        s.y = y[k];
+        s.dx = dx[k];
+        s.dy = dy[k];
+    }
+    s.width = (p->width - s.x + s.dx - 1) / s.dx; /* 0 where p->width <= x < dx: unsigned numbers wrap back */
+    s.height = s.width == 0 ? 0 : (p->height - s.y + s.dy - 1) / s.dy;
+    s.row = ((size_t)s.width * (size_t)(p->channels * p->depth) + 7) / 8;
+    return s;
+}
+
+/* Undoes the filter of a row of `size` bytes, whose number stands before it; `up` is the row above, NULL: none. */
+static int pti_png_unfilter(unsigned char *row, const unsigned char *up, size_t size, size_t pixel)
+{
+    size_t k;
+    int filter = row[-1];
+    for (k = 0; k < size; k++) {
+        int a = k < pixel ? 0 : row[k - pixel], p = up ? up[k] : 0, c = up && k >= pixel ? up[k - pixel] : 0;
+        row[k] = (unsigned char)(row[k] + (filter == 0 ? 0 : filter == 1 ? a : filter == 2 ? p : filter == 3 ? (a + p) / 2 : pti_paeth(a, p, c)));
+    }
+    return filter <= 4;
+}
+
+/* Sample i of a row. */
+static uint32_t pti_png_sample(const unsigned char *row, size_t i, int depth)
+{
+    size_t bit = i * (size_t)depth;
+    if (depth == 16) return (uint32_t)row[2 * i] << 8 | row[2 * i + 1];
+    return ((uint32_t)row[bit / 8] >> (8 - depth - (int)(bit % 8))) & ((1u << depth) - 1);
+}
+
+/* Linear light of pixel i of a row; 0: beyond the palette. */
+static int pti_png_pixel(const pti_png *p, const pti_levels *levels, const unsigned char *row, size_t i, float *to)
+{
+    uint32_t v;
+    int k;
+    for (k = 0; k < 3; k++) {
+        v = pti_png_sample(row, i * (size_t)p->channels + (size_t)(p->channels >= 3 ? k : 0), p->depth);
+        if (p->type == 3 && v >= p->colours) return 0;
+        to[k] = pti_level(levels, p->type == 3 ? p->palette[3 * v + (uint32_t)k] : v);
+    }
+    return 1;
+}
+
+static int pti_png_picture(const pti_png *p, unsigned char *raw, pt_image *image)
+{
+    size_t pixel = (size_t)(p->channels * p->depth + 7) / 8;
+    pti_levels levels;
+    uint32_t x, y;
+    int k;
+    pti_levels_make(&levels, p->type == 3 ? 255 : (1u << p->depth) - 1);
+    for (k = 0; k < (p->is_interlaced ? 7 : 1); k++) {
+        pti_png_pass s = pti_png_pass_make(p, k);
+        for (y = 0; y < s.height; y++, raw += s.row + 1) {
+            float *to = image->rgb + 3 * ((size_t)(s.y + y * s.dy) * p->width + s.x);
+            if (!pti_png_unfilter(raw + 1, y > 0 ? raw - s.row : NULL, s.row, pixel)) return 0;
+            for (x = 0; x < s.width; x++)
+                if (!pti_png_pixel(p, &levels, raw + 1, x, to + 3 * (size_t)x * s.dx)) return 0;
+        }
+    }
+    return 1;
+}
+
+/* Inflates and decodes; the picture's own memory is asked for last, when all checksums are right. No deflate stream is
+   longer than 1032 times its bytes: 258 for 2 bits. */
+static pt_result pti_read_png(unsigned char *file, size_t size, pt_image *image)
+{
+    pt_result result = PT_ERROR_FILE;
+    pti_inflater *s;
+    uint64_t raw = 0;
+    pti_png p;
+    int k;
+    if (!pti_png_chunks(&p, file, size)) return PT_ERROR_FILE;
+    for (k = 0; k < (p.is_interlaced ? 7 : 1); k++) {
+        pti_png_pass pass = pti_png_pass_make(&p, k);
+        raw += ((uint64_t)pass.row + 1) * pass.height;
+    }
+    if (raw / 1032 > p.size || raw > SIZE_MAX) return PT_ERROR_FILE;
+    s = (pti_inflater *)pti_alloc_zero(1, sizeof *s, image->alloc_user);
+    if (!s) return PT_ERROR_MEMORY;
+    s->in = file;
+    s->end = file + p.size;
+    s->size = (size_t)raw;
+    s->out = (unsigned char *)pti_alloc(s->size, 1, image->alloc_user);
+    if (!s->out) result = PT_ERROR_MEMORY;
+    else if (pti_inflate(s)) result = pti_image_make(image, (int)p.width, (int)p.height);
+    if (result == PT_OK && !pti_png_picture(&p, s->out, image)) result = PT_ERROR_FILE;
+    pti_free(s->out, image->alloc_user);
+    pti_free(s, image->alloc_user);
+    return result;
+}
+
+PTDEF pt_result pt_read_image(const char *path, pt_image *image)
+{
+    unsigned char *file;
+    char word[8];
+    size_t size;
+    pti_bytes b;
+    pt_result result;
+    pt_image_free(image);
+    result = pti_read_file(path, image->alloc_user, &file, &size);
+    if (result != PT_OK) return result == PT_ERROR_MEMORY ? result : PT_ERROR_FILE;
+    b.at = file;
+    b.end = file + size;
+    result = PT_ERROR_FILE;
+    if (size >= 8 && memcmp(file, pti_png_signature, 8) == 0) result = pti_read_png(file, size, image);
+    else if (!pti_read_word(&b, word, sizeof word)) result = PT_ERROR_FILE;
+    else if (strcmp(word, "P6") == 0 || strcmp(word, "P3") == 0) result = pti_read_ppm(&b, image, word[1] == '3');
+    else if (strcmp(word, "PF") == 0) result = pti_read_pfm(&b, image);
+    pti_free(file, image->alloc_user);
+    if (result != PT_OK) pt_image_free(image);
     return result;
 }
 
