@@ -21,13 +21,15 @@
 #include <signal.h>
 #include <stdlib.h>
 
-/* C99 cannot ask whether stderr is a terminal; these systems can. */
+/* C99 cannot ask whether stderr is a terminal, and whether a name is that of a device; these systems can. */
 #if defined(_WIN32)
 #include <io.h>
 #define STDERR_IS_TERMINAL() (_isatty(_fileno(stderr)) != 0)
 #elif defined(__unix__) || defined(__APPLE__)
+#include <sys/stat.h>
 #include <unistd.h>
 #define STDERR_IS_TERMINAL() (isatty(2) != 0)
+#define HAS_STAT 1
 #else
 #define STDERR_IS_TERMINAL() 0
 #endif
@@ -46,7 +48,9 @@ typedef struct job {
     pt_report report;      /* of all steps                                                                 */
     float *reference;
     uint32_t first, last;  /* samples per pixel at the start (a checkpoint's), and the most; 0 = no limit      */
-    double start, cpu_start, saved, relmse; /* clocks; when a checkpoint was last written; latest estimate     */
+    uint32_t saved_spp;    /* of the last checkpoint, and when that was written                            */
+    double saved;
+    double start, cpu_start, relmse; /* clocks at the start; latest estimate, -1 = none                    */
     double shown;          /* wall seconds at which progress was last shown                                */
     int line_length;       /* characters of the progress line that stand on the terminal                   */
 } job;
@@ -252,16 +256,17 @@ static pt_result render_step(job *j)
 }
 
 /* Writes a checkpoint if it is time, or if this is the last one. 0 if that fails, which does not stop the render. */
-static int save(job *j, int now)
+static int save(job *j, int last)
 {
-    int ok = 1;
+    uint32_t spp = pt_film_spp(&j->film);
 
-    if (!j->t->checkpoint || pt_film_spp(&j->film) == 0) return 1;
-    if (!now && pt_wall_seconds() - j->saved < j->t->every) return 1;
+    if (!j->t->checkpoint || spp == j->saved_spp) return 1;
+    if (!last && pt_wall_seconds() - j->saved < j->t->every) return 1;
     end_progress(j);
-    ok = write_checkpoint(j->t->checkpoint, &j->film);
     j->saved = pt_wall_seconds();
-    return ok;
+    if (!write_checkpoint(j->t->checkpoint, &j->film)) return 0;
+    j->saved_spp = spp;
+    return 1;
 }
 
 /* Is the film that was resumed one of this picture? Asked by a render that has nothing to do. */
@@ -293,7 +298,7 @@ static pt_result run_steps(job *j)
         if (pt_film_spp(&j->film) == before) break; /* a path outlasted the time, or an error */
         if (result == PT_OK) save(j, 0);
     }
-    if (stopped) j->report.stopped_by = stopped;
+    if (stopped || interrupted) j->report.stopped_by = stopped ? stopped : "a signal";
     return result;
 }
 
@@ -306,7 +311,8 @@ static int deliver(job *j)
     const pt_report *reports[1];
     int ok;
 
-    pt_report_print(&j->report, stdout);
+    if (j->report.row_count > 0) pt_report_print(&j->report, stdout);
+    else describe_film(&j->film, 1); /* a checkpoint that was complete */
     ok = fflush(stdout) == 0 && !ferror(stdout);
     ok &= save(j, 1);
     ok &= write_pictures(t, &j->film);
@@ -359,7 +365,7 @@ static int render_subject(job *j)
 
     if (!all_writable(t) || !open_checkpoint(j) || !make_subject(t, &j->scene)) return EXIT_FAILED;
     if (t->reference && !(j->reference = read_reference(t->reference, t->desc.width, t->desc.height))) return EXIT_FAILED;
-    j->first = pt_film_spp(&j->film);
+    j->first = j->saved_spp = pt_film_spp(&j->film);
     j->last = t->desc.spp;
     j->relmse = -1;
     j->start = j->saved = j->shown = pt_wall_seconds();

@@ -1,6 +1,8 @@
 /* films.h - a part of render.c: films and pictures as files. Checkpoints, joining the films of shards, and how far
    two pictures are from each other. */
 
+enum { PATH_SIZE = 4000 }; /* the header's writers take a little more                                    */
+
 /* Can it be opened? Says nothing about what is in it. */
 static int is_there(const char *path)
 {
@@ -27,11 +29,11 @@ static int tell_written(const char *path, pt_result result)
 /* ---- checkpoints ------------------------------------------------------------------------------------- */
 
 /* path with something behind it; NULL if that is too long. */
-static const char *with_suffix(const char *path, const char *suffix, char out[1024])
+static const char *with_suffix(const char *path, const char *suffix, char out[PATH_SIZE])
 {
-    int length = snprintf(out, 1024, "%s%s", path, suffix);
+    int length = snprintf(out, PATH_SIZE, "%s%s", path, suffix);
 
-    return length > 0 && length < 1024 ? out : NULL;
+    return length > 0 && length < PATH_SIZE ? out : NULL;
 }
 
 /* Renames a file over another one. Only POSIX replaces by itself. */
@@ -47,7 +49,7 @@ static int replace_file(const char *from, const char *to)
    FILE.new becomes FILE. At every moment FILE or FILE.1 is whole, and a disk that is full takes neither away. */
 static int write_checkpoint(const char *path, const pt_film *film)
 {
-    char fresh[1024], last[1024];
+    char fresh[PATH_SIZE], last[PATH_SIZE];
     pt_result result;
 
     if (!with_suffix(path, ".new", fresh) || !with_suffix(path, ".1", last)) return file_error(path, "the name is too long");
@@ -63,7 +65,7 @@ static int write_checkpoint(const char *path, const pt_film *film)
    stderr if there are some, but all are damaged. */
 static int read_checkpoint(const char *path, pt_film *film)
 {
-    char last[1024];
+    char last[PATH_SIZE];
     const char *names[2];
     int k, seen = 0;
 
@@ -89,7 +91,7 @@ static int read_checkpoint(const char *path, pt_film *film)
 /* Before a render without --resume: would it write over a checkpoint that somebody may want? */
 static int checkpoint_is_free(const char *path)
 {
-    char last[1024];
+    char last[PATH_SIZE];
 
     if (!with_suffix(path, ".1", last)) return file_error(path, "the name is too long");
     if (is_there(path)) return file_error(path, "this checkpoint exists; --resume goes on from it, or remove it first");

@@ -383,7 +383,7 @@ static const option option_table[] = {
     {"--csv", set_text, AT(csv), MODE_RENDER, 0, 0, NULL, NULL},
     {"--svg", set_text, AT(svg), MODE_RENDER, 0, 0, NULL, NULL},
     {"--reference", set_text, AT(reference), MODE_RENDER, 0, 0, NULL, NULL},
-    {"--progress", set_name, AT(progress), MODE_RENDER, 0, 0, "auto, line, plain or off", progress_names},
+    {"--progress", set_name, AT(progress), ~0, 0, 0, "auto, line, plain or off", progress_names},
     {"--verbose", set_flag, AT(verbose), MODE_RENDER, 0, 0, NULL, NULL},
     {"--film", set_text, AT(film), MODE_FILMS, 0, 0, NULL, NULL},
     {"--checkpoint", set_text, AT(checkpoint), MODE_RENDER, 0, 0, NULL, NULL},
@@ -424,7 +424,7 @@ static void print_help(void)
           "Method   --method NAME  --sampler NAME     see --list\n"
           "         --filter NAME     of the pixel: box (default), tent, gaussian\n"
           "         --only WORDS      light along such paths only: 'LS+DE', 'L(S|D)*DDE'\n"
-          "         --max-edges N     longest path: 1 lights, 2 direct light, ... (no limit)\n"
+          "         --max-edges N     longest path: 1 lights, 2 direct light, ... (any)\n"
           "         --roulette R      throughput (default), none, or a survival probability\n"
           "         --branching N     directions per hit of method branching (4)\n"
           "         --seed N          other random numbers (0)\n"
@@ -435,10 +435,10 @@ static void print_help(void)
           "         --verbose         what the scene holds and needs\n"
           "         --list            scenes, methods, samplers\n"
           "Long     --film FILE       the sums of all samples, for --merge and --compare\n"
-          "         --checkpoint FILE that film every --every S seconds (60), and at the end\n"
+          "         --checkpoint FILE that film, every --every S seconds (60), at the end\n"
           "         --resume          go on from the checkpoint, if there is one\n"
           "         --shard I/N       the I-th of N parts of the samples, into a film\n"
-          "Ctrl-C keeps the finished passes.  Exit: 0 done, 1 failed, 2 command line, 130 ^C\n",
+          "Ctrl-C keeps what is done.  Exit: 0 done, 1 failed, 2 command line, 130 Ctrl-C\n",
           stdout);
 }
 

@@ -1,19 +1,35 @@
 /* pictures.h - a part of render.c: writing what a film holds. The picture itself, and layers of it turned into
    pictures: albedo, normal, depth, and the estimated error. */
 
-/* Can this file be written? Found out before the work, not after it; an existing file stays as it is. */
+/* A file that is written is replaced as a whole; a device such as /dev/null, or a directory, must not be. */
+static int is_replaceable(const char *path)
+{
+#ifdef HAS_STAT
+    struct stat s;
+
+    if (stat(path, &s) == 0 && !S_ISREG(s.st_mode)) return file_error(path, "cannot be written: it is no regular file");
+#else
+    (void)path;
+#endif
+    return 1;
+}
+
+/* Can this file be written? Found out before the work, not after it, with the name that the writer begins with; an
+   existing file stays as it is. */
 static int is_writable(const char *path)
 {
+    char part[PATH_SIZE];
     FILE *f;
-    int exists = is_there(path);
 
-    f = fopen(path, exists ? "r+b" : "wb");
+    if (!is_replaceable(path)) return 0;
+    if (!with_suffix(path, ".part", part)) return file_error(path, "the name is too long");
+    f = fopen(part, "wb");
     if (!f) {
         fprintf(stderr, "render: cannot write '%s': %s\n", path, strerror(errno));
         return 0;
     }
     fclose(f);
-    if (!exists) remove(path);
+    remove(part);
     return 1;
 }
 
