@@ -129,7 +129,7 @@ static pt_result write_result(const work *w, const pt_film *film)
     pt_error error;
 
     if (result == PT_OK && pt_film_error_estimate(film, &error))
-        printf("%s: %d ranks, %u samples per pixel, estimated relMSE %.6g\n", w->output, w->ranks, (unsigned)pt_film_spp(film), error.relmse);
+        printf("%s: %d rank%s, %u samples per pixel, estimated relMSE %.6g\n", w->output, w->ranks, w->ranks == 1 ? "" : "s", (unsigned)pt_film_spp(film), error.relmse);
     return result;
 }
 

@@ -146,15 +146,16 @@ static int is_doubling(uint32_t spp)
     return (spp & (spp - 1)) == 0;
 }
 
-/* Samples that fit into what is left of the time budgets, and until the next checkpoint. Without checkpoints a step is
-   five seconds, the most that Ctrl-C can lose beyond the first sample. */
+/* Samples that fit into ten seconds, the most that Ctrl-C then loses (or one sample), and into what is left of the time
+   budgets and until the next checkpoint. */
 static double samples_in_time(const job *j, uint32_t done)
 {
     const pt_render_desc *d = &j->t->desc;
     double wall = j->report.wall_seconds, made = (double)done - j->first, time;
 
     if (made <= 0 || !(wall > 0)) return HUGE_VAL; /* not known yet: the next doubling */
-    time = j->t->checkpoint ? fmax(0, j->t->every - (pt_wall_seconds() - j->saved)) : 5;
+    time = 10;
+    if (j->t->checkpoint) time = fmin(time, fmax(0, j->t->every - (pt_wall_seconds() - j->saved)));
     if (d->seconds > 0) time = fmin(time, d->seconds - (pt_wall_seconds() - j->start));
     if (d->cpu_seconds > 0) time = fmin(time, (d->cpu_seconds - (pt_cpu_seconds() - j->cpu_start)) * wall / j->report.cpu_seconds);
     return time * made / wall;
