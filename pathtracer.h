@@ -130,6 +130,7 @@
        [Coo84] Cook, Porter, Carpenter: Distributed Ray Tracing, 1984
        [Duf17] Duff et al.: Building an Orthonormal Basis, Revisited, JCGT 6(1), 2017
        [Dup23] Dupuy, Benyoub: Sampling Visible GGX Normals with Spherical Caps, 2023
+       [Gul14] Gulbrandsen: Artist Friendly Metallic Fresnel, JCGT 3(4), 2014
        [Hai19] Haines, Guenther, Akenine-Moeller: Precision Improvements for Ray/Sphere Intersection,
                Ray Tracing Gems ch. 7, 2019
        [Hei14] Heitz: Understanding the Masking-Shadowing Function, JCGT 3(2), 2014
@@ -9102,6 +9103,1090 @@ PTDEF pt_result pt_read_image(const char *path, pt_image *image)
     if (result != PT_OK) pt_image_free(image);
     return result;
 }
+
+#if PTI_HAS_OBJ
+/* --- models: OBJ and MTL --- */
+
+/* Where in a text the reading is. A 0 ends the text; \n, \r or both end a line, unless a \ stands before. */
+typedef struct pti_text {
+    const char *at;
+    uint32_t line;
+} pti_text;
+
+static int pti_is_line_end(int c)
+{
+    return c == '\n' || c == '\r' || c == 0;
+}
+
+/* Goes over blanks; 0: the line ends here. */
+static int pti_skip_blanks(pti_text *t)
+{
+    for (;; t->at++) {
+        if (t->at[0] == '\\' && t->at[1] != 0 && pti_is_line_end(t->at[1])) {
+            t->at += t->at[1] == '\r' && t->at[2] == '\n' ? 2 : 1;
+            t->line++;
+        } else if (*t->at != ' ' && *t->at != '\t') {
+            return !pti_is_line_end(*t->at);
+        }
+    }
+}
+
+static int pti_word_ends(const char *p)
+{
+    return *p == ' ' || *p == '\t' || pti_is_line_end(*p) || (p[0] == '\\' && pti_is_line_end(p[1]));
+}
+
+/* The next word of the line, and its length; 0: there is none. */
+static size_t pti_take_word(pti_text *t, const char **word)
+{
+    pti_skip_blanks(t);
+    for (*word = t->at; !pti_word_ends(t->at);) t->at++;
+    return (size_t)(t->at - *word);
+}
+
+static int pti_word_is(const char *word, size_t size, const char *text)
+{
+    return strlen(text) == size && memcmp(word, text, size) == 0;
+}
+
+/* The rest of the line without the blanks around it: names may have blanks. */
+static size_t pti_take_rest(pti_text *t, const char **rest)
+{
+    size_t n;
+    pti_skip_blanks(t);
+    *rest = t->at;
+    n = strcspn(t->at, "\r\n");
+    t->at += n;
+    while (n > 0 && pti_is_blank((*rest)[n - 1])) n--;
+    return n;
+}
+
+static void pti_next_line(pti_text *t)
+{
+    while (pti_skip_blanks(t)) t->at++;
+    if (*t->at) t->at += t->at[0] == '\r' && t->at[1] == '\n' ? 2 : 1;
+    t->line++;
+}
+
+/* m 10^e. Both m < 2^53 and 10^22 are exact doubles, so that for |e| <= 22 the one operation rounds correctly. Beyond
+   are at most 20 roundings: relative error below 2^-48 where the result is not subnormal. */
+static double pti_scale_10(uint64_t m, int64_t e)
+{
+    static const double ten[23] = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,  1e8,  1e9,  1e10, 1e11,
+                                   1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
+    double x = (double)m;
+    e = e < -400 ? -400 : e > 400 ? 400 : e; /* m < 10^19: 0 or infinite long before */
+    for (; e > 22; e -= 22) x *= 1e22;
+    for (; e < -22; e += 22) x /= 1e22;
+    return e < 0 ? x / ten[-e] : x * ten[e];
+}
+
+/* A decimal number, in every locale with a point; goes behind it. Digits after the 19th count as zeros. 0: there is
+   none. */
+static int pti_take_number(const char **at, double *value)
+{
+    const char *p = *at;
+    int minus = *p == '-', digits = 0, fraction = 0, less;
+    int64_t e = 0, more = 0;
+    uint64_t m = 0;
+    if (*p == '-' || *p == '+') p++;
+    for (; (*p >= '0' && *p <= '9') || (*p == '.' && !fraction); p++) {
+        if (*p == '.') {
+            fraction = 1;
+        } else if (m < 1000000000000000000u) {
+            m = 10 * m + (uint64_t)(*p - '0');
+            e -= fraction;
+            digits = 1;
+        } else {
+            e += !fraction;
+        }
+    }
+    if (!digits) return 0;
+    if ((*p == 'e' || *p == 'E') && (p[1] == '-' || p[1] == '+' ? (p[2] >= '0' && p[2] <= '9') : (p[1] >= '0' && p[1] <= '9'))) {
+        less = p[1] == '-';
+        for (p += p[1] == '-' || p[1] == '+' ? 2 : 1; *p >= '0' && *p <= '9'; p++)
+            if (more < 1000000000) more = 10 * more + (*p - '0');
+        e += less ? -more : more;
+    }
+    *at = p;
+    *value = minus ? -pti_scale_10(m, e) : pti_scale_10(m, e);
+    return 1;
+}
+
+/* Up to `most` numbers of the line; how many, or -1: a word is no number. */
+static int pti_take_numbers(pti_text *t, double *values, int most)
+{
+    int n = 0;
+    while (n < most && pti_skip_blanks(t) && *t->at != '#')
+        if (!pti_take_number(&t->at, &values[n++]) || !pti_word_ends(t->at)) return -1;
+    return n;
+}
+
+/* A hash table of numbers of things that are kept elsewhere. */
+typedef struct pti_slot {
+    uint32_t hash, id;      /* id + 1; 0: free                                                             */
+} pti_slot;
+typedef struct pti_table {
+    pti_slot *slots;
+    size_t capacity;        /* a power of two, at least twice the count                                    */
+    size_t count;
+} pti_table;
+
+/* Makes room for one more; 0: no memory. */
+static int pti_table_reserve(pti_table *t, void *user)
+{
+    pti_table more;
+    size_t i, at;
+    if (2 * (t->count + 1) <= t->capacity) return 1;
+    more.count = t->count;
+    more.capacity = t->capacity > 0 ? 2 * t->capacity : 64;
+    more.slots = (pti_slot *)pti_alloc_zero(more.capacity, sizeof *more.slots, user);
+    if (!more.slots) return 0;
+    for (i = 0; i < t->capacity; i++) {
+        if (t->slots[i].id == 0) continue;
+        for (at = t->slots[i].hash & (more.capacity - 1); more.slots[at].id != 0;) at = (at + 1) & (more.capacity - 1);
+        more.slots[at] = t->slots[i];
+    }
+    pti_free(t->slots, user);
+    *t = more;
+    return 1;
+}
+
+/* The slot of the thing that `same` finds equal to the key, or the free one where it belongs. */
+static pti_slot *pti_table_find(const pti_table *t, uint32_t hash, int (*same)(const void *key, uint32_t id), const void *key)
+{
+    size_t at = hash & (t->capacity - 1);
+    while (t->slots[at].id != 0 && !(t->slots[at].hash == hash && same(key, t->slots[at].id - 1))) at = (at + 1) & (t->capacity - 1);
+    return &t->slots[at];
+}
+
+#define PTI_NONE UINT32_MAX
+
+/* A corner of a face: indices of v, vt, vn; PTI_NONE: without. */
+typedef struct pti_corner {
+    uint32_t v, vt, vn;
+} pti_corner;
+
+/* What a newmtl says; texts are places in the pool of the loader, 0: none. */
+typedef struct pti_mtl {
+    double kd[3], ks[3], ke[3], ns, ni, d, pr, pm, tr, illum, scale[2];
+    unsigned given;          /* bits in the order of pti_mtl_keys                                          */
+    uint32_t name, file, line, map;
+    int id;                  /* in the scene, -1: not yet                                                  */
+} pti_mtl;
+
+enum { PTI_MTL_KD = 1, PTI_MTL_KS = 2, PTI_MTL_KE = 4, PTI_MTL_NS = 8, PTI_MTL_NI = 16, PTI_MTL_D = 32, PTI_MTL_PR = 64, PTI_MTL_PM = 128, PTI_MTL_TR = 256, PTI_MTL_ILLUM = 512 };
+
+/* Its numbers, and the range that they are kept in: that of pt_material, of the format (Ni), or what fits a float. */
+static const struct {
+    char key[6];
+    unsigned char count;
+    unsigned short offset;
+    double lo, hi;
+} pti_mtl_keys[10] = {{"Kd", 3, offsetof(pti_mtl, kd), 0, 1},     {"Ks", 3, offsetof(pti_mtl, ks), 0, 1},
+                      {"Ke", 3, offsetof(pti_mtl, ke), 0, 1e30},  {"Ns", 1, offsetof(pti_mtl, ns), 0, 1e6},
+                      {"Ni", 1, offsetof(pti_mtl, ni), 0.001, 10}, {"d", 1, offsetof(pti_mtl, d), 0, 1},
+                      {"Pr", 1, offsetof(pti_mtl, pr), 0, 1},     {"Pm", 1, offsetof(pti_mtl, pm), 0, 1},
+                      {"Tr", 1, offsetof(pti_mtl, tr), 0, 1},     {"illum", 1, offsetof(pti_mtl, illum), 0, 10}};
+
+/* A picture and its path in the pool. */
+typedef struct pti_picture {
+    uint32_t path;
+    pt_image image;
+} pti_picture;
+
+/* A loader. */
+typedef struct pti_obj {
+    pt_scene *scene;
+    pt_obj_options options;
+    pt_obj_info *info;
+    pt_result result;
+    const char *file;        /* what is being read, and where                                              */
+    pti_text text;
+    double cofactor[3][3];   /* for normals: the inverse transposed, times a positive factor               */
+    int mirrors;
+    pt_vec3 *v, *vn;
+    pt_vec2 *vt;
+    pti_corner *corners;     /* the vertices of the mesh: each combination once                            */
+    pti_corner *face;        /* the corners of the current one                                             */
+    pti_mtl *mtls;
+    char *pool;
+    uint32_t v_count, vn_count, vt_count, corner_count, face_count, mtl_count, pool_count;
+    uint32_t v_capacity, vn_capacity, vt_capacity, corner_capacity, face_capacity, mtl_capacity, pool_capacity;
+    pti_table corner_table, name_table;
+    uint32_t library;        /* the MTL file that was read last                                            */
+    int across, upward;      /* the axes on which the current face is looked at                            */
+    int mesh[4];             /* of the scene, for triangles without and with vn (2) and vt (1); -1: none   */
+    int mesh_count;
+    int material;            /* of mtls, for the faces to come, -1: none                                   */
+    int plain;               /* of the scene, for faces without, -1: not yet                               */
+#if PTI_HAS_TEXTURES
+    int told;                /* that a face with a picture has no vt                                       */
+    pti_picture *pictures;   /* that were read, owned by the scene                                         */
+    uint32_t picture_count, picture_capacity;
+#endif
+} pti_obj;
+
+/* "<file>:<line>: <what>'<name>'<end>"; a name is cut at 60 bytes, and what is no letter is shown as '?'. */
+static void pti_obj_say(const pti_obj *o, char *text, const char *what, const char *name, size_t size, const char *end)
+{
+    const size_t room = sizeof o->info->error;
+    const char *file = o->file, *p;
+    char letters[64] = "'";
+    size_t n = 1;
+    for (p = file; *p; p++)
+        if (*p == '/' || *p == '\\') file = p + 1;
+    text[0] = 0;
+    pti_append(text, 64, file);
+    if (o->text.line > 0) {
+        pti_append(text, room, ":");
+        pti_append_integer(text, room, o->text.line);
+    }
+    pti_append(text, room, ": ");
+    pti_append(text, room, what);
+    for (; n <= size && n < 61; n++) letters[n] = (char)((unsigned char)name[n - 1] < 32 || name[n - 1] == 127 ? '?' : name[n - 1]);
+    letters[n] = '\'';
+    if (size > 0) pti_append(text, room, letters);
+    pti_append(text, room, end);
+}
+
+static void pti_obj_warn(pti_obj *o, const char *what, const char *name, size_t size, const char *end)
+{
+    if (o->info->warning_count < PT_OBJ_WARNINGS) pti_obj_say(o, o->info->warnings[o->info->warning_count], what, name, size, end);
+    o->info->warning_count++;
+}
+
+/* Ends the loading; returns 0. */
+static int pti_obj_fail(pti_obj *o, pt_result result, const char *what, const char *name, size_t size, const char *end)
+{
+    o->result = result;
+    pti_obj_say(o, o->info->error, what, name, size, end);
+    return 0;
+}
+
+static int pti_obj_no_memory(pti_obj *o)
+{
+    return pti_obj_fail(o, PT_ERROR_MEMORY, "out of memory", "", 0, "");
+}
+
+/* Appends one element to an array of the loader, or fails. */
+#define PTI_OBJ_PUSH(o, array, number, capacity, value) \
+    (pti_reserve(&(o)->array, &(o)->capacity, (size_t)(o)->number + 1, sizeof *(o)->array, (o)->scene->alloc_user) \
+         ? ((o)->array[(o)->number++] = (value), 1) \
+         : pti_obj_no_memory(o))
+
+/* Keeps a text; where it stands in the pool, 0: no memory. */
+static uint32_t pti_obj_keep(pti_obj *o, const char *text, size_t size)
+{
+    uint32_t at = o->pool_count > 0 ? o->pool_count : 1;
+    if (!pti_reserve(&o->pool, &o->pool_capacity, (size_t)at + size + 1, 1, o->scene->alloc_user)) {
+        pti_obj_no_memory(o);
+        return 0;
+    }
+    memcpy(o->pool + at, text, size);
+    o->pool[at + size] = 0;
+    o->pool_count = (uint32_t)(at + size + 1);
+    return at;
+}
+
+/* Keeps the path of a file that the current one names: beside it unless the name is absolute. */
+static uint32_t pti_obj_path(pti_obj *o, const char *name, size_t size)
+{
+    size_t n = strlen(o->file);
+    uint32_t at, i;
+    while (n > 0 && o->file[n - 1] != '/' && o->file[n - 1] != '\\') n--;
+    if (name[0] == '/' || name[0] == '\\' || (size > 1 && name[1] == ':')) n = 0;
+    at = pti_obj_keep(o, o->file, n);
+    if (at > 0) o->pool_count--; /* goes on behind */
+    if (at == 0 || !pti_obj_keep(o, name, size)) return 0;
+    for (i = at + (uint32_t)n; o->pool[i]; i++)
+        if (o->pool[i] == '\\') o->pool[i] = '/';
+    return at;
+}
+
+/* Opens a text in place of the current one. */
+static pt_result pti_obj_open(pti_obj *o, const char *path, unsigned char **bytes)
+{
+    size_t size;
+    pt_result result = pti_read_file(path, o->scene->alloc_user, bytes, &size);
+    if (result == PT_OK && memchr(*bytes, 0, size)) {
+        pti_free(*bytes, o->scene->alloc_user);
+        result = PT_ERROR_SCENE; /* no text */
+    }
+    if (result != PT_OK) return result;
+    o->file = path;
+    o->text.at = (const char *)*bytes + (memcmp(*bytes, "\xef\xbb\xbf", size < 3 ? 0 : 3) == 0 && size >= 3 ? 3 : 0); /* byte order mark */
+    o->text.line = 1;
+    return PT_OK;
+}
+
+/* --- MTL --- */
+
+typedef struct pti_name_key {
+    const pti_obj *o;
+    const char *name;
+    size_t size;
+} pti_name_key;
+
+static int pti_same_name(const void *key, uint32_t id)
+{
+    const pti_name_key *k = (const pti_name_key *)key;
+    return pti_word_is(k->name, k->size, k->o->pool + k->o->mtls[id].name);
+}
+
+/* The slot of a material's name; NULL: no memory. */
+static pti_slot *pti_obj_name(pti_obj *o, const char *name, size_t size, uint32_t *hash)
+{
+    const pti_name_key key = {o, name, size};
+    uint64_t h = size;
+    size_t i;
+    for (i = 0; i < size; i++) h = pt_hash64(h ^ (uint64_t)(unsigned char)name[i]);
+    *hash = (uint32_t)h;
+    if (!pti_table_reserve(&o->name_table, o->scene->alloc_user)) return NULL;
+    return pti_table_find(&o->name_table, *hash, pti_same_name, &key);
+}
+
+/* newmtl: a material of that name; if there is one already, that stays. */
+static int pti_mtl_begin(pti_obj *o)
+{
+    const char *name;
+    size_t size = pti_take_rest(&o->text, &name);
+    uint32_t hash;
+    pti_slot *slot;
+    pti_mtl m;
+    memset(&m, 0, sizeof m);
+    m.id = -1;
+    m.d = m.scale[0] = m.scale[1] = 1;
+    m.line = o->text.line;
+    m.name = pti_obj_keep(o, name, size);
+    if (m.name > 0) m.file = pti_obj_keep(o, o->file, strlen(o->file));
+    if (m.file == 0 || !PTI_OBJ_PUSH(o, mtls, mtl_count, mtl_capacity, m)) return 0;
+    slot = pti_obj_name(o, name, size, &hash);
+    if (!slot) return pti_obj_no_memory(o);
+    if (slot->id != 0) return 1;
+    slot->hash = hash;
+    slot->id = o->mtl_count;
+    o->name_table.count++;
+    return 1;
+}
+
+/* A line of numbers. Outside their range they are moved into it; only Ni is then as if it were not there. */
+static void pti_mtl_number(pti_obj *o, pti_mtl *m, int key)
+{
+    const char *name = pti_mtl_keys[key].key;
+    double v[3], *to = (double *)(void *)((char *)m + pti_mtl_keys[key].offset), lo = pti_mtl_keys[key].lo, hi = pti_mtl_keys[key].hi;
+    int count = pti_mtl_keys[key].count, n = pti_take_numbers(&o->text, v, count), k, outside = 0;
+    if (n != 1 && n != count) {
+        pti_obj_warn(o, "", name, strlen(name), " without its numbers is ignored");
+        return;
+    }
+    for (k = 0; k < count; k++) {
+        to[k] = v[n == 1 ? 0 : k];
+        outside |= !(to[k] >= lo && to[k] <= hi);
+        to[k] = to[k] > lo ? (to[k] < hi ? to[k] : hi) : lo;
+    }
+    if (outside) pti_obj_warn(o, "", name, strlen(name), " is out of range");
+    if (!(outside && 1 << key == PTI_MTL_NI)) m->given |= 1u << key;
+}
+
+/* map_Kd: options, then a name. -s u v is how often the picture is repeated; the others are skipped. */
+static int pti_mtl_map(pti_obj *o, pti_mtl *m)
+{
+    static const char *const options[12] = {"-s", "-o", "-t", "-mm", "-bm", "-clamp", "-blendu", "-blendv", "-cc", "-texres", "-imfchan", "-boost"};
+    const char *word;
+    size_t size;
+    for (;;) {
+        pti_text before = o->text;
+        double v[3] = {1, 1, 1}, unused;
+        int k, n = 0;
+        size = pti_take_word(&o->text, &word);
+        for (k = 0; k < 12 && !pti_word_is(word, size, options[k]);) k++;
+        if (k == 12) {
+            o->text = before;
+            break;
+        }
+        for (; n < 3 && pti_skip_blanks(&o->text); n++) { /* its numbers, or one word */
+            before = o->text;
+            if (pti_take_number(&before.at, k == 0 ? &v[n] : &unused) && pti_word_ends(before.at)) o->text = before;
+            else break;
+        }
+        if (n == 0) pti_take_word(&o->text, &before.at);
+        if (k > 0) pti_obj_warn(o, "option ", word, size, " of map_Kd is skipped");
+        for (n = 0; k == 0 && n < 2; n++) m->scale[n] = fabs(v[n]) <= 1e6 ? v[n] : 1;
+    }
+    size = pti_take_rest(&o->text, &word);
+    m->map = size > 0 ? pti_obj_path(o, word, size) : 0;
+    return o->result == PT_OK;
+}
+
+static int pti_mtl_line(pti_obj *o)
+{
+    const char *word;
+    size_t size = pti_take_word(&o->text, &word);
+    pti_mtl *m = o->mtl_count > 0 ? &o->mtls[o->mtl_count - 1] : NULL;
+    int k;
+    if (size == 0 || *word == '#') {
+        o->text.at += strcspn(o->text.at, "\r\n"); /* a comment does not go on */
+        return 1;
+    }
+    if (pti_word_is(word, size, "newmtl")) return pti_mtl_begin(o);
+    if (m && pti_word_is(word, size, "map_Kd")) return pti_mtl_map(o, m);
+    for (k = 0; m && k < 10; k++)
+        if (pti_word_is(word, size, pti_mtl_keys[k].key)) {
+            pti_mtl_number(o, m, k);
+            return 1;
+        }
+    if (!pti_word_is(word, size, "Ka") && !pti_word_is(word, size, "Tf")) o->info->skipped_lines++;
+    return 1;
+}
+
+/* Reads an MTL file; 0: it cannot be read, or memory ended. */
+static int pti_mtl_read(pti_obj *o, const char *name, size_t size)
+{
+    const char *file = o->file;
+    pti_text text = o->text;
+    unsigned char *bytes;
+    char *path;
+    pt_result result;
+    uint32_t at = pti_obj_path(o, name, size);
+    if (at == 0) return 0;
+    if (o->library > 0 && strcmp(o->pool + at, o->pool + o->library) == 0) return 1;
+    path = (char *)pti_alloc(strlen(o->pool + at) + 1, 1, o->scene->alloc_user); /* the pool moves as it grows */
+    if (!path) return pti_obj_no_memory(o);
+    memcpy(path, o->pool + at, strlen(o->pool + at) + 1);
+    result = pti_obj_open(o, path, &bytes);
+    if (result == PT_OK) {
+        uint32_t first = o->mtl_count;
+        o->library = at;
+        for (; *o->text.at && o->result == PT_OK; pti_next_line(&o->text))
+            if (!pti_mtl_line(o)) break;
+        if (first == o->mtl_count) pti_obj_warn(o, "no newmtl in it", "", 0, "");
+        pti_free(bytes, o->scene->alloc_user);
+    }
+    pti_free(path, o->scene->alloc_user);
+    o->file = file;
+    o->text = text;
+    if (result == PT_ERROR_MEMORY) pti_obj_no_memory(o);
+    return result == PT_OK && o->result == PT_OK;
+}
+
+/* mtllib: one name that may have blanks, or several that have none. */
+static int pti_obj_libraries(pti_obj *o)
+{
+    pti_text line = o->text;
+    const char *name;
+    size_t size = pti_take_rest(&o->text, &name);
+    if ((o->options.flags & PT_OBJ_NO_MTL) || (size > 0 && pti_mtl_read(o, name, size))) return 1;
+    o->text = line;
+    while (o->result == PT_OK && (size = pti_take_word(&o->text, &name)) > 0)
+        if (!pti_mtl_read(o, name, size) && o->result == PT_OK) pti_obj_warn(o, "cannot read ", name, size, "");
+    return o->result == PT_OK;
+}
+
+/* --- materials --- */
+
+static pt_rgb pti_mtl_rgb(const double *v, double factor)
+{
+    return pt_rgb3((pt_real)(v[0] * factor), (pt_real)(v[1] * factor), (pt_real)(v[2] * factor));
+}
+
+static double pti_mtl_max(const double *v)
+{
+    return fmax(v[0], fmax(v[1], v[2]));
+}
+
+/* A metal of given reflectance r head on. Of all n - i k with that r the one of smallest n, for which n^2 + k^2 = 1, has
+   a reflectance that only rises towards grazing angles [Gul14]. r is kept 2^-20 below 1, as n must not be 0. */
+static pt_material pti_mtl_metal(const double *reflectance, double roughness)
+{
+    pt_material m = pti_material_of_kind(PT_MATERIAL_CONDUCTOR, pt_rgb_grey(1));
+    double n[3], k[3];
+    int i;
+    for (i = 0; i < 3; i++) {
+        double r = fmin(reflectance[i], 1 - 9.5367431640625e-7);
+        n[i] = (1 - r) / (1 + r);
+        k[i] = 2 * sqrt(r) / (1 + r);
+    }
+    m.eta = pti_mtl_rgb(n, 1);
+    m.k = pti_mtl_rgb(k, 1);
+    m.roughness = (pt_real)roughness;
+    return m;
+}
+
+/* Diffuse and glossy; together they reflect at most 1. */
+static pt_material pti_mtl_glossy(pti_obj *o, const pti_mtl *s, pt_material_kind kind, const double *kd, const double *ks, double exponent)
+{
+    pt_material m = pti_material_of_kind(kind, pt_rgb_grey(0));
+    double most = 1;
+    int k;
+    for (k = 0; k < 3; k++) most = fmax(most, kd[k] + ks[k]);
+    if (most > 1) pti_obj_warn(o, "", o->pool + s->name, strlen(o->pool + s->name), ": diffuse and specular exceed 1 and are scaled down");
+    m.albedo = pti_mtl_rgb(kd, 1 / most);
+    m.specular = pti_mtl_rgb(ks, 1 / most);
+    m.exponent = (pt_real)exponent;
+    return m;
+}
+
+/* Kd as it is used: white beside a picture that it would blacken. */
+static void pti_mtl_diffuse(const pti_mtl *s, double *kd)
+{
+    int k, white = s->map > 0 && (!(s->given & PTI_MTL_KD) || pti_mtl_max(s->kd) == 0);
+    for (k = 0; k < 3; k++) kd[k] = white ? 1 : s->given & PTI_MTL_KD ? s->kd[k] : 0.8;
+}
+
+/* The table above pt_load_obj. GGX of roughness Pr has alpha = Pr^2, about as wide as a Blinn-Phong lobe of exponent
+   2 / alpha^2 - 2 [Wal07]; that would be above 1e6 for Pr < 0.04. */
+static pt_material pti_mtl_surface(pti_obj *o, const pti_mtl *s)
+{
+    double kd[3], ks[3], d = s->given & PTI_MTL_D ? s->d : 1 - s->tr, pr = s->given & PTI_MTL_PR ? s->pr : 0;
+    double ior = s->given & PTI_MTL_NI ? s->ni : 1.5, f0 = (ior - 1) / (ior + 1);
+    int illum = s->given & PTI_MTL_ILLUM ? (int)s->illum : 2;
+    pt_material m;
+    pti_mtl_diffuse(s, kd);
+    if (s->given & PTI_MTL_PM && s->pm >= 0.5) {
+        m = pti_mtl_metal(kd, pr);
+    } else if (illum == 4 || illum == 6 || illum == 7 || illum == 9 || d < 0.5) {
+        m = pt_material_dielectric((pt_real)ior);
+        m.roughness = (pt_real)pr;
+    } else if ((illum == 3 || illum == 5) && pti_mtl_max(s->ks) > 0 && pti_mtl_max(s->ks) >= pti_mtl_max(kd)) {
+        m = pr > 0 ? pti_mtl_metal(s->ks, pr) : pt_material_mirror(pti_mtl_rgb(s->ks, 1));
+    } else if (s->given & PTI_MTL_PR && pr < 0.04) {
+        m = pti_material_of_kind(PT_MATERIAL_COAT, pti_mtl_rgb(kd, 1));
+        m.ior = (pt_real)fmax(ior, 1.001);
+    } else if (s->given & PTI_MTL_PR) {
+        ks[0] = ks[1] = ks[2] = f0 * f0;
+        m = pti_mtl_glossy(o, s, PT_MATERIAL_BLINN, kd, ks, 2 / (pr * pr * pr * pr) - 2);
+    } else if (pti_mtl_max(s->ks) > 0 && illum > 1) {
+        m = pti_mtl_glossy(o, s, PT_MATERIAL_PHONG, kd, s->ks, s->ns);
+    } else {
+        m = pt_material_diffuse(pti_mtl_rgb(kd, 1));
+    }
+    return m;
+}
+
+#if PTI_HAS_TEXTURES
+/* Gives a block to the scene; 0: no memory, the block is freed. */
+static int pti_scene_own(pt_scene *scene, void *block)
+{
+    if (block && pti_reserve(&scene->owned, &scene->owned_capacity, (size_t)scene->owned_count + 1, sizeof *scene->owned, scene->alloc_user)) {
+        scene->owned[scene->owned_count++] = block;
+        return 1;
+    }
+    pti_free(block, scene->alloc_user);
+    return 0;
+}
+
+/* The picture of a path, read once; NULL: it cannot be read (a warning), or no memory. */
+static const pt_image *pti_obj_picture(pti_obj *o, uint32_t path)
+{
+    const char *name = o->pool + path;
+    pti_picture p;
+    size_t i;
+    pt_result result;
+    for (i = 0; i < o->picture_count; i++)
+        if (strcmp(o->pool + o->pictures[i].path, name) == 0) return &o->pictures[i].image;
+    memset(&p, 0, sizeof p);
+    p.path = path;
+    p.image.alloc_user = o->scene->alloc_user;
+    result = pt_read_image(name, &p.image);
+    if (result == PT_ERROR_FILE) pti_obj_warn(o, "no PPM, PFM or PNG: ", name, strlen(name), "; Kd alone is used");
+    if (result == PT_ERROR_MEMORY) pti_obj_no_memory(o);
+    if (result != PT_OK) return NULL;
+    for (i = 0; i < 3 * (size_t)p.image.width * (size_t)p.image.height; i++) { /* a reflectance; a PFM may hold anything */
+        float v = p.image.rgb[i];
+        p.image.rgb[i] = v > 0 ? (v < 1 ? v : 1) : 0;
+    }
+    if (!pti_scene_own(o->scene, p.image.rgb)) {
+        pti_obj_no_memory(o);
+        return NULL;
+    }
+    if (!PTI_OBJ_PUSH(o, pictures, picture_count, picture_capacity, p)) return NULL;
+    o->info->textures++;
+    return &o->pictures[o->picture_count - 1].image;
+}
+#endif
+
+/* Lets the picture of map_Kd multiply the albedo; what has none goes without. */
+static int pti_obj_texture(pti_obj *o, const pti_mtl *s, pt_material *m)
+{
+#if PTI_HAS_TEXTURES
+    const pt_image *image;
+    pt_texture *t;
+    if (s->map == 0 || (o->options.flags & PT_OBJ_NO_TEXTURES) || m->kind == PT_MATERIAL_DIELECTRIC || m->kind == PT_MATERIAL_MIRROR) return 1;
+    image = pti_obj_picture(o, s->map);
+    if (!image) return o->result == PT_OK;
+    t = (pt_texture *)pti_alloc_zero(1, sizeof *t, o->scene->alloc_user);
+    if (!pti_scene_own(o->scene, t)) return pti_obj_no_memory(o);
+    t->rgb = image->rgb;
+    t->width = image->width;
+    t->height = image->height;
+    t->scale = pt_v2((pt_real)s->scale[0], (pt_real)s->scale[1]);
+    m->texture = t;
+#else
+    if (s->map > 0 && !(o->options.flags & PT_OBJ_NO_TEXTURES) && m->kind != PT_MATERIAL_DIELECTRIC && m->kind != PT_MATERIAL_MIRROR)
+        pti_scene_fail(o->scene, PT_ERROR_LEFT_OUT, "material", o->scene->material_count, "textures were left out: PT_NO_TEXTURES");
+#endif
+    return 1;
+}
+
+/* Adds a material to the scene; its id, -1: the loading has ended. */
+static int pti_obj_add_material(pti_obj *o, pt_material m)
+{
+    int id = o->scene->error == PT_OK ? pt_add_material(o->scene, m) : -1;
+    if (id >= 0) o->info->materials++;
+    else pti_obj_fail(o, o->scene->error, pt_scene_error(o->scene), "", 0, "");
+    return id;
+}
+
+/* The scene's material of a newmtl, added when a face first needs it. Sentences name its line. */
+static int pti_obj_mtl_id(pti_obj *o, pti_mtl *s)
+{
+    const char *file = o->file;
+    pti_text text = o->text;
+    pt_material m;
+    double scale = o->options.emission_scale > 0 ? o->options.emission_scale : 1, ke[3];
+    int k;
+    if (s->id >= 0) return s->id;
+    o->file = o->pool + s->file;
+    o->text.line = s->line;
+    for (k = 0; k < 3; k++) ke[k] = fmin(s->ke[k] * scale, pti_mtl_keys[2].hi);
+    m = pti_mtl_surface(o, s);
+    m.emission = pti_mtl_rgb(ke, 1);
+    if (pti_obj_texture(o, s, &m)) s->id = pti_obj_add_material(o, m);
+    o->file = file;
+    o->text = text;
+    return s->id;
+}
+
+static int pti_obj_material(pti_obj *o)
+{
+    if (o->material >= 0) return pti_obj_mtl_id(o, &o->mtls[o->material]);
+    if (o->plain < 0) o->plain = pti_obj_add_material(o, pt_material_diffuse(pt_rgb_grey(PTI_R(0.8))));
+    return o->plain;
+}
+
+static int pti_obj_use(pti_obj *o)
+{
+    const char *name;
+    size_t size = pti_take_rest(&o->text, &name);
+    uint32_t hash;
+    const pti_slot *slot;
+    if (o->options.flags & PT_OBJ_NO_MTL) return 1;
+    slot = pti_obj_name(o, name, size, &hash);
+    if (!slot) return pti_obj_no_memory(o);
+    o->material = (int)slot->id - 1;
+    if (slot->id == 0) pti_obj_warn(o, "no newmtl ", name, size, "");
+    return 1;
+}
+
+/* --- vertices and faces --- */
+
+static int pti_obj_position(pti_obj *o)
+{
+    double p[3], q[3], bad;
+    const double (*a)[4] = (const double (*)[4])o->options.transform;
+    pt_vec3 v;
+    int k;
+    if (pti_take_numbers(&o->text, p, 3) != 3) return pti_obj_fail(o, PT_ERROR_FILE, "'v' without three numbers", "", 0, "");
+    for (k = 0; k < 3; k++) {
+        q[k] = a[k][0] * p[0] + a[k][1] * p[1] + a[k][2] * p[2] + a[k][3];
+        if (!(fabs(q[k]) <= PT_MAX_COORDINATE)) return pti_obj_fail(o, PT_ERROR_FILE, "a coordinate beyond 1e18", "", 0, "");
+    }
+    v = pt_v3((pt_real)q[0], (pt_real)q[1], (pt_real)q[2]);
+    if (pti_coordinate_bad(v, &bad)) return pti_obj_fail(o, PT_ERROR_FILE, "a coordinate beyond 1e18", "", 0, "");
+    return PTI_OBJ_PUSH(o, v, v_count, v_capacity, v);
+}
+
+/* A normal that is none is kept as 0. */
+static int pti_obj_normal(pti_obj *o)
+{
+    const double (*c)[3] = (const double (*)[3])o->cofactor;
+    double v[3];
+    pti_d3 n = pti_d(0, 0, 0);
+    if (pti_take_numbers(&o->text, v, 3) == 3)
+        n = pti_d_normalize(pti_d(c[0][0] * v[0] + c[0][1] * v[1] + c[0][2] * v[2], c[1][0] * v[0] + c[1][1] * v[1] + c[1][2] * v[2],
+                                  c[2][0] * v[0] + c[2][1] * v[1] + c[2][2] * v[2]));
+    if (!(pti_d_dot(n, n) > 0.5)) {
+        pti_obj_warn(o, "a normal that is 0 or no number: faces with it are flat", "", 0, "");
+        n = pti_d(0, 0, 0);
+    }
+    return PTI_OBJ_PUSH(o, vn, vn_count, vn_capacity, pti_d_to(n));
+}
+
+static int pti_obj_uv(pti_obj *o)
+{
+    double v[2] = {0, 0};
+    if (pti_take_numbers(&o->text, v, 2) < 1 || !(fabs(v[0]) <= PT_MAX_COORDINATE && fabs(v[1]) <= PT_MAX_COORDINATE)) {
+        pti_obj_warn(o, "'vt' that is no number or beyond 1e18 is taken as 0", "", 0, "");
+        v[0] = v[1] = 0;
+    }
+    return PTI_OBJ_PUSH(o, vt, vt_count, vt_capacity, pt_v2((pt_real)v[0], (pt_real)v[1]));
+}
+
+/* An index: from 1, or negative from the latest; 0: the loading has ended. */
+static int pti_obj_index(pti_obj *o, uint32_t count, uint32_t *index)
+{
+    const char *p = o->text.at, *word = p;
+    int minus = *p == '-';
+    uint64_t i = 0;
+    for (p += minus; *p >= '0' && *p <= '9'; p++)
+        if (i < 10000000000u) i = 10 * i + (uint64_t)(*p - '0');
+    if (i == 0 || i > count) return pti_obj_fail(o, PT_ERROR_FILE, "index ", word, strcspn(word, " \t\r\n"), " points nowhere");
+    o->text.at = p;
+    *index = (uint32_t)(minus ? count - i : i - 1);
+    return 1;
+}
+
+/* v, v/vt, v//vn or v/vt/vn */
+static int pti_obj_corner(pti_obj *o)
+{
+    const char *word = o->text.at;
+    pti_corner c = {PTI_NONE, PTI_NONE, PTI_NONE};
+    if (!pti_obj_index(o, o->v_count, &c.v)) return 0;
+    if (*o->text.at == '/') {
+        o->text.at++;
+        if (*o->text.at != '/' && !pti_word_ends(o->text.at) && !pti_obj_index(o, o->vt_count, &c.vt)) return 0;
+    }
+    if (*o->text.at == '/') {
+        o->text.at++;
+        if (!pti_word_ends(o->text.at) && !pti_obj_index(o, o->vn_count, &c.vn)) return 0;
+    }
+    if (!pti_word_ends(o->text.at)) return pti_obj_fail(o, PT_ERROR_FILE, "no corner of a face: ", word, strcspn(word, " \t\r\n"), "");
+    return PTI_OBJ_PUSH(o, face, face_count, face_capacity, c);
+}
+
+typedef struct pti_corner_key {
+    const pti_corner *corners;
+    pti_corner corner;
+} pti_corner_key;
+
+static int pti_same_corner(const void *key, uint32_t id)
+{
+    const pti_corner_key *k = (const pti_corner_key *)key;
+    return memcmp(&k->corners[id], &k->corner, sizeof k->corner) == 0;
+}
+
+/* The vertex of a corner; PTI_NONE: no memory. */
+static uint32_t pti_obj_vertex(pti_obj *o, const pti_corner *c)
+{
+    const pti_corner_key key = {o->corners, *c};
+    uint32_t hash = (uint32_t)pt_hash64(pt_hash64((uint64_t)c->v << 32 | c->vt) ^ c->vn);
+    pti_slot *slot;
+    if (!pti_table_reserve(&o->corner_table, o->scene->alloc_user)) {
+        pti_obj_no_memory(o);
+        return PTI_NONE;
+    }
+    slot = pti_table_find(&o->corner_table, hash, pti_same_corner, &key);
+    if (slot->id == 0) {
+        if (!PTI_OBJ_PUSH(o, corners, corner_count, corner_capacity, *c)) return PTI_NONE;
+        slot->hash = hash;
+        slot->id = o->corner_count;
+        o->corner_table.count++;
+    }
+    return slot->id - 1;
+}
+
+/* Widens the box. */
+static void pti_obj_widen(pt_obj_info *info, pt_vec3 p)
+{
+    const pt_vec3 lo = info->lo, hi = info->hi;
+    info->lo = pt_v3(p.x < lo.x ? p.x : lo.x, p.y < lo.y ? p.y : lo.y, p.z < lo.z ? p.z : lo.z);
+    info->hi = pt_v3(p.x > hi.x ? p.x : hi.x, p.y > hi.y ? p.y : hi.y, p.z > hi.z ? p.z : hi.z);
+}
+
+/* Adds the triangle of three corners of the face, if it has an area. Its vertices are counted from those that the scene
+   gets in the end. */
+static int pti_obj_triangle(pti_obj *o, uint32_t i, uint32_t j, uint32_t k, int material)
+{
+    const uint32_t corner[3] = {i, o->mirrors ? k : j, o->mirrors ? j : k};
+    const pti_corner *f = o->face;
+    pt_scene *scene = o->scene;
+    pt_triangle t;
+    int n, *mesh = &o->mesh[(f->vn != PTI_NONE ? 2 : 0) + (f->vt != PTI_NONE ? 1 : 0)];
+    if (!pti_triangle_has_area(o->v[f[i].v], o->v[f[j].v], o->v[f[k].v])) return 1;
+    if (*mesh < 0) *mesh = (int)scene->mesh_count + o->mesh_count++;
+    t.material = material;
+    t.mesh = *mesh;
+    if (o->info->triangles == 0) o->info->lo = o->info->hi = o->v[f[i].v];
+    for (n = 0; n < 3; n++) {
+        t.v[n] = pti_obj_vertex(o, &f[corner[n]]);
+        if (t.v[n] == PTI_NONE) return 0;
+        t.v[n] += scene->position_count;
+        pti_obj_widen(o->info, o->v[f[corner[n]].v]);
+    }
+    if (!pti_reserve(&scene->triangles, &scene->triangle_capacity, (size_t)scene->triangle_count + 1, sizeof t, scene->alloc_user)) return pti_obj_no_memory(o);
+    scene->triangles[scene->triangle_count++] = t;
+    o->info->triangles++;
+    if (!pti_rgb_black(scene->materials[material].emission)) o->info->emissive_triangles++;
+    return 1;
+}
+
+static double pti_obj_along(const pti_obj *o, uint32_t corner, int axis)
+{
+    const pt_vec3 *p = &o->v[o->face[corner].v];
+    return (double)(axis == 0 ? p->x : axis == 1 ? p->y : p->z);
+}
+
+/* Twice the area of three corners as the face is looked at: positive if they turn to the left. */
+static double pti_obj_turn(const pti_obj *o, uint32_t a, uint32_t b, uint32_t c)
+{
+    double x = pti_obj_along(o, a, o->across), y = pti_obj_along(o, a, o->upward);
+    return (pti_obj_along(o, b, o->across) - x) * (pti_obj_along(o, c, o->upward) - y) -
+           (pti_obj_along(o, b, o->upward) - y) * (pti_obj_along(o, c, o->across) - x);
+}
+
+/* Looks at the face along the axis that is nearest to its normal (the sum of the areas of a fan), from outside. */
+static void pti_obj_look(pti_obj *o)
+{
+    double area[3] = {0, 0, 0};
+    uint32_t i;
+    int k, best = 0;
+    for (k = 0; k < 3; k++) {
+        o->across = (k + 1) % 3;
+        o->upward = (k + 2) % 3;
+        for (i = 1; i + 1 < o->face_count; i++) area[k] += pti_obj_turn(o, 0, i, i + 1);
+        if (fabs(area[k]) > fabs(area[best])) best = k;
+    }
+    o->across = (best + (area[best] < 0 ? 2 : 1)) % 3;
+    o->upward = (best + (area[best] < 0 ? 1 : 2)) % 3;
+}
+
+static int pti_same_point(pt_vec3 a, pt_vec3 b)
+{
+    return a.x == b.x && a.y == b.y && a.z == b.z;
+}
+
+/* Does nothing of the polygon lie in the triangle at its i-th corner, which turns to the left? Corners that lie on those
+   of the triangle do not count: a hole is often tied to its rim by a double edge. */
+static int pti_obj_is_ear(const pti_obj *o, const uint32_t *ring, uint32_t n, uint32_t i, uint32_t *work)
+{
+    uint32_t a = ring[(i + n - 1) % n], b = ring[i], c = ring[(i + 1) % n], k;
+    if (!(pti_obj_turn(o, a, b, c) > 0)) return 0;
+    for (k = 0; k < n; k++) {
+        const pti_corner *f = o->face;
+        const pt_vec3 *v = o->v, d = v[f[ring[k]].v];
+        *work += 1;
+        if (pti_obj_turn(o, a, b, ring[k]) < 0 || pti_obj_turn(o, b, c, ring[k]) < 0 || pti_obj_turn(o, c, a, ring[k]) < 0) continue;
+        if (!pti_same_point(d, v[f[a].v]) && !pti_same_point(d, v[f[b].v]) && !pti_same_point(d, v[f[c].v])) return 0;
+    }
+    return 1;
+}
+
+/* A polygon of more corners is cut as a fan if it is not convex; so is what is left after that much work. */
+enum { PTI_EARS_MAX = 1024, PTI_EARS_WORK = 1 << 24 };
+
+/* Cuts off one ear after the other: a simple polygon has two. A corner on a straight line is none yet, so that no edge
+   is left with a corner of a neighbour in its middle. */
+static int pti_obj_cut(pti_obj *o, int material)
+{
+    uint32_t ring[PTI_EARS_MAX], n = o->face_count, i, failed = 0, work = 0, ears;
+    int ok = 1;
+    for (i = 0; i < n; i++) ring[i] = i;
+    for (i = 1; ok && n > 3 && failed < n && work < PTI_EARS_WORK;) {
+        if (pti_obj_is_ear(o, ring, n, i, &work)) {
+            ok = pti_obj_triangle(o, ring[(i + n - 1) % n], ring[i], ring[(i + 1) % n], material);
+            memmove(ring + i, ring + i + 1, (n - i - 1) * sizeof *ring);
+            i = i < --n ? i : 0;
+            failed = 0;
+        } else {
+            i = (i + 1) % n;
+            failed++;
+        }
+    }
+    ears = o->info->triangles;
+    for (i = 1; ok && i + 1 < n; i++) ok = pti_obj_triangle(o, ring[0], ring[i], ring[i + 1], material);
+    if (n > 3 && o->info->triangles > ears) pti_obj_warn(o, "a polygon that crosses itself: some of it is cut as a fan", "", 0, "");
+    return ok;
+}
+
+static int pti_obj_polygon(pti_obj *o, int material)
+{
+    uint32_t n = o->face_count, i;
+    int convex = 1;
+    if (n > 3) pti_obj_look(o);
+    for (i = 0; convex && n > 3 && i < n; i++) convex = pti_obj_turn(o, i, (i + 1) % n, (i + 2) % n) > 0;
+    if (!convex && n <= PTI_EARS_MAX) return pti_obj_cut(o, material);
+    if (!convex) pti_obj_warn(o, "a polygon of more than 1024 corners that is not convex is cut as a fan", "", 0, "");
+    for (i = 1; i + 1 < n; i++)
+        if (!pti_obj_triangle(o, 0, i, i + 1, material)) return 0;
+    return 1;
+}
+
+static int pti_obj_face(pti_obj *o)
+{
+    uint32_t before = o->info->triangles, i;
+    int material, has_vt = 1, has_vn = 1;
+    o->face_count = 0;
+    while (pti_skip_blanks(&o->text) && *o->text.at != '#')
+        if (!pti_obj_corner(o)) return 0;
+    for (i = 0; i < o->face_count; i++) {
+        const pti_corner *c = &o->face[i];
+        has_vt &= c->vt != PTI_NONE;
+        has_vn = has_vn && c->vn != PTI_NONE && pt_v3_dot(o->vn[c->vn], o->vn[c->vn]) > 0;
+    }
+    for (i = 0; i < o->face_count; i++) {
+        if (!has_vt) o->face[i].vt = PTI_NONE;
+        if (!has_vn) o->face[i].vn = PTI_NONE;
+    }
+    material = pti_obj_material(o);
+    if (material < 0 || !pti_obj_polygon(o, material)) return 0;
+#if PTI_HAS_TEXTURES
+    if (!has_vt && !o->told && o->scene->materials[material].texture) {
+        pti_obj_warn(o, "a face without vt has a picture: each triangle shows its corner", "", 0, "");
+        o->told = 1;
+    }
+#endif
+    if (o->info->triangles == before) o->info->degenerate_faces++;
+    return 1;
+}
+
+/* --- the whole --- */
+
+static int pti_obj_line(pti_obj *o)
+{
+    const char *word;
+    size_t size = pti_take_word(&o->text, &word);
+    if (size == 0 || *word == '#') {
+        o->text.at += strcspn(o->text.at, "\r\n"); /* a comment does not go on */
+        return 1;
+    }
+    if (pti_word_is(word, size, "v")) return pti_obj_position(o);
+    if (pti_word_is(word, size, "f")) return pti_obj_face(o);
+    if (pti_word_is(word, size, "vn")) return pti_obj_normal(o);
+    if (pti_word_is(word, size, "vt")) return pti_obj_uv(o);
+    if (pti_word_is(word, size, "usemtl")) return pti_obj_use(o);
+    if (pti_word_is(word, size, "mtllib")) return pti_obj_libraries(o);
+    if (pti_word_is(word, size, "g") || pti_word_is(word, size, "o") || pti_word_is(word, size, "s")) return 1;
+    if (o->info->skipped_lines++ == 0) pti_obj_warn(o, "", word, size, " is skipped, and what else is no face");
+    return 1;
+}
+
+static int pti_obj_read(pti_obj *o, const char *path)
+{
+    unsigned char *bytes;
+    pt_result result;
+    o->file = path ? path : "";
+    result = pti_obj_open(o, path, &bytes);
+    if (result == PT_ERROR_MEMORY) return pti_obj_no_memory(o);
+    if (result != PT_OK)
+        return pti_obj_fail(o, PT_ERROR_FILE, result == PT_ERROR_ARGUMENT ? "is larger than 2 GiB" : result == PT_ERROR_SCENE ? "is not a text" : "cannot be read", "", 0, "");
+    for (; *o->text.at && o->result == PT_OK; pti_next_line(&o->text))
+        if (!pti_obj_line(o)) break;
+    pti_free(bytes, o->scene->alloc_user);
+    if (o->result == PT_OK && o->info->triangles == 0) {
+        o->text.line = 0;
+        pti_obj_fail(o, PT_ERROR_FILE, "holds no triangle with an area", "", 0, "");
+    }
+    return o->result == PT_OK;
+}
+
+/* The transform and what follows from it. */
+static int pti_obj_prepare(pti_obj *o)
+{
+    double (*a)[4] = o->options.transform, zero = 0, det = 0;
+    int i, k;
+    for (i = 0; i < 3; i++)
+        for (k = 0; k < 4; k++) zero = fmax(zero, a[i][k] == 0 ? 0 : 1); /* NaN too is not 0 */
+    for (i = 0; zero == 0 && i < 3; i++) a[i][i] = 1;
+    for (i = 0; i < 3; i++)
+        for (k = 0; k < 3; k++)
+            o->cofactor[i][k] = a[(i + 1) % 3][(k + 1) % 3] * a[(i + 2) % 3][(k + 2) % 3] - a[(i + 1) % 3][(k + 2) % 3] * a[(i + 2) % 3][(k + 1) % 3];
+    for (k = 0; k < 3; k++) det += a[0][k] * o->cofactor[0][k];
+    if (det == 0 || !pti_finite(det) || !pti_finite(a[0][3] + a[1][3] + a[2][3])) return pti_obj_fail(o, PT_ERROR_ARGUMENT, "the transform is not finite or has no inverse", "", 0, "");
+    o->mirrors = det < 0;
+    for (i = 0; o->mirrors && i < 3; i++)
+        for (k = 0; k < 3; k++) o->cofactor[i][k] = -o->cofactor[i][k];
+    if (!(o->options.emission_scale >= 0) || !pti_finite(o->options.emission_scale))
+        return pti_obj_fail(o, PT_ERROR_ARGUMENT, "the scale of the emission is negative or not finite", "", 0, "");
+    if (!(o->options.flags & PT_OBJ_MATERIAL)) return 1;
+    o->plain = o->options.material;
+    if (o->plain >= 0 && (uint32_t)o->plain < o->scene->material_count) return 1;
+    return pti_obj_fail(o, PT_ERROR_ARGUMENT, "the material of the options does not exist", "", 0, "");
+}
+
+/* Gives the vertices to the scene, for which all memory is asked first. Those without vt or vn have 0 there, and no
+   triangle that looks. */
+static int pti_obj_finish(pti_obj *o)
+{
+    pt_scene *s = o->scene;
+    void *user = s->alloc_user;
+    int has_vn = o->mesh[2] >= 0 || o->mesh[3] >= 0, has_vt = o->mesh[1] >= 0 || o->mesh[3] >= 0, k;
+    uint32_t base = s->position_count, n = o->corner_count, i;
+    if (!pti_reserve(&s->positions, &s->position_capacity, (size_t)base + n, sizeof *s->positions, user) ||
+        (has_vn && !pti_reserve(&s->normals, &s->normal_capacity, (size_t)s->normal_count + n, sizeof *s->normals, user)) ||
+        (has_vt && !pti_reserve(&s->uvs, &s->uv_capacity, (size_t)s->uv_count + n, sizeof *s->uvs, user)) ||
+        !pti_reserve(&s->meshes, &s->mesh_capacity, (size_t)s->mesh_count + 4, sizeof *s->meshes, user))
+        return pti_obj_no_memory(o);
+    for (k = 0; k < 4; k++) {
+        if (o->mesh[k] < 0) continue;
+        s->meshes[o->mesh[k]].has_normals = k >= 2;
+        s->meshes[o->mesh[k]].has_uvs = k % 2;
+        s->meshes[o->mesh[k]].normal_offset = (int64_t)s->normal_count - base;
+        s->meshes[o->mesh[k]].uv_offset = (int64_t)s->uv_count - base;
+        s->mesh_count++;
+    }
+    for (i = 0; i < n; i++) {
+        const pti_corner *c = &o->corners[i];
+        s->positions[s->position_count++] = o->v[c->v];
+        if (has_vn) s->normals[s->normal_count++] = c->vn == PTI_NONE ? pt_v3(0, 0, 0) : o->vn[c->vn];
+        if (has_vt) s->uvs[s->uv_count++] = c->vt == PTI_NONE ? pt_v2(0, 0) : o->vt[c->vt];
+    }
+    o->info->vertices = n;
+    s->committed = 0;
+    return 1;
+}
+
+static void pti_obj_free(pti_obj *o)
+{
+    void *user = o->scene->alloc_user;
+    pti_free(o->v, user);
+    pti_free(o->vn, user);
+    pti_free(o->vt, user);
+    pti_free(o->corners, user);
+    pti_free(o->face, user);
+    pti_free(o->mtls, user);
+    pti_free(o->pool, user);
+    pti_free(o->corner_table.slots, user);
+    pti_free(o->name_table.slots, user);
+#if PTI_HAS_TEXTURES
+    pti_free(o->pictures, user);
+#endif
+}
+
+PTDEF pt_result pt_load_obj(pt_scene *scene, const char *path, const pt_obj_options *options, pt_obj_info *info)
+{
+    const uint32_t materials = scene->material_count, triangles = scene->triangle_count, owned = scene->owned_count;
+    const int committed = scene->committed;
+    pt_obj_info unseen;
+    pti_obj o;
+    memset(&o, 0, sizeof o);
+    o.scene = scene;
+    o.info = info ? info : &unseen;
+    o.file = path ? path : "";
+    o.material = o.plain = o.mesh[0] = o.mesh[1] = o.mesh[2] = o.mesh[3] = -1;
+    if (options) o.options = *options;
+    memset(o.info, 0, sizeof *o.info);
+    if (scene->error != PT_OK) {
+        pti_obj_fail(&o, scene->error, pt_scene_error(scene), "", 0, "");
+        return o.result;
+    }
+    if (pti_obj_prepare(&o) && pti_obj_read(&o, path)) pti_obj_finish(&o);
+    if (o.result != PT_OK) {
+        pti_disown(scene, owned);
+        scene->material_count = materials;
+        scene->triangle_count = triangles;
+        scene->committed = committed;
+        o.info->triangles = o.info->emissive_triangles = o.info->materials = o.info->textures = 0;
+        o.info->lo = o.info->hi = pt_v3(0, 0, 0);
+    }
+    if (o.result == PT_ERROR_MEMORY) { /* the scene itself is whole */
+        scene->error = PT_OK;
+        scene->error_text[0] = 0;
+    }
+    pti_obj_free(&o);
+    return o.result;
+}
+#endif /* PTI_HAS_OBJ */
 
 #endif /* PTI_HAS_FILES */
 
