@@ -293,7 +293,7 @@ static pt_result run_steps(job *j)
     const char *stopped = NULL;
     uint32_t before;
 
-    while (result == PT_OK && !(stopped = budget_used(j))) {
+    while (result == PT_OK && !interrupted && !(stopped = budget_used(j))) {
         before = pt_film_spp(&j->film);
         result = render_step(j);
         if (pt_film_spp(&j->film) == before) break; /* a path outlasted the time, or an error */

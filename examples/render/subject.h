@@ -224,7 +224,9 @@ static int make_model(tool *t, pt_scene *scene)
 
     placement_of(t, options.transform);
     result = pt_load_obj(scene, t->words[0], &options, &info);
-    if (result != PT_OK) return subject_error(t, info.error[0] ? info.error : pt_result_string(result));
+    if (result != PT_OK && info.error[0]) fprintf(stderr, "render: %s\n", info.error); /* it names the file */
+    else if (result != PT_OK) return subject_error(t, pt_result_string(result));
+    if (result != PT_OK) return 0;
     tell_warnings(&info);
     if (!measure(t, &info, &e)) return 0;
     t->desc.camera = frame_model(t, &e);
