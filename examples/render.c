@@ -29,7 +29,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 #define STDERR_IS_TERMINAL() (isatty(2) != 0)
-#define HAS_STAT 1
+#define IS_POSIX 1
 #else
 #define STDERR_IS_TERMINAL() 0
 #endif
@@ -66,10 +66,19 @@ static void on_signal(int number)
     signal(number, SIG_DFL);
 }
 
+/* One that is ignored stays so: for a program in the background Ctrl-C is not meant, with nohup the hang-up. */
+static void catch_signal(int number)
+{
+    if (signal(number, on_signal) == SIG_IGN) signal(number, SIG_IGN);
+}
+
 static void catch_signals(void)
 {
-    if (signal(SIGINT, on_signal) == SIG_IGN) signal(SIGINT, SIG_IGN); /* in the background: not meant */
-    signal(SIGTERM, on_signal); /* batch systems send it when time is up */
+    catch_signal(SIGINT);
+    catch_signal(SIGTERM); /* batch systems send it when time is up */
+#ifdef IS_POSIX
+    catch_signal(SIGHUP); /* the terminal is gone */
+#endif
 }
 
 /* ---- progress -------------------------------------------------------------------------------------- */
@@ -416,6 +425,9 @@ int main(int argc, char **argv)
         else print_list();
         return fflush(stdout) == 0 ? EXIT_OK : EXIT_FAILED;
     }
+#ifdef IS_POSIX
+    signal(SIGPIPE, SIG_IGN); /* where nobody reads the table any more, the pictures are written all the same */
+#endif
     if (t.progress == PROGRESS_AUTO) t.progress = STDERR_IS_TERMINAL() ? PROGRESS_LINE : PROGRESS_PLAIN;
     if (!(t.every > 0)) t.every = 60;
     return t.mode == MODE_MERGE ? run_merge(&t) : t.mode == MODE_COMPARE ? run_compare(&t) : run_render(&t);

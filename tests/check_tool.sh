@@ -210,6 +210,11 @@ check $? 'against itself as the reference the true error is the rounding to floa
 fails '40 x 30' cornell --size 8x8 --reference c.pfm
 fails '8 x 8' --compare f.film c.film
 
+# Nobody reads stdout and stderr to the end: the pictures are written all the same.
+"$render" furnace --size 8x8 --spp 4 --progress off -o pipe.png 2>&1 | :
+is_png pipe.png
+check $? 'a closed pipe loses no picture'
+
 # ---- shards --------------------------------------------------------------------------------------
 
 quiet cornell-spheres --size 40x30 --spp 17 --progress off --depth z.png --only 'L.*DE' --film whole.film -o whole.png

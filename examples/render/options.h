@@ -417,7 +417,7 @@ static void print_help(void)
           "Model    --rotate X,Y,Z  --scale S  --translate X,Y,Z    degrees; in this order\n"
           "         --floor           a grey floor under it\n"
           "         --sky L           light from all around: radiance, R,G,B, or a picture\n"
-          "         --lamp L          a square lamp, left above the eye, of radiance L\n"
+          "         --lamp L          a round lamp in the sky, left above the eye: radiance\n"
           "Budget   --spp N           samples per pixel (64; no limit with one of the next)\n"
           "         --seconds S  --cpu-seconds S     time of the clock, of all threads\n"
           "         --error E         until the estimated relative error is below E\n"

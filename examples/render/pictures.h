@@ -4,7 +4,7 @@
 /* A file that is written is replaced as a whole; a device such as /dev/null, or a directory, must not be. */
 static int is_replaceable(const char *path)
 {
-#ifdef HAS_STAT
+#ifdef IS_POSIX
     struct stat s;
 
     if (stat(path, &s) == 0 && !S_ISREG(s.st_mode)) return file_error(path, "cannot be written: it is no regular file");

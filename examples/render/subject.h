@@ -161,49 +161,80 @@ static void add_floor(pt_scene *scene, const extent *e)
     pt_add_parallelogram(scene, corner, pt_v3_scale(e->front, (pt_real)side), pt_v3_scale(e->right, (pt_real)side), grey);
 }
 
-/* A square lamp, left above and behind the eye, that shines on the model: as wide as the model's radius times 2,
-   from a distance of four radii. */
-static void add_lamp(pt_scene *scene, const extent *e, const pt_camera *c, double radiance)
+/* Where --lamp shines from: left above and behind the eye. */
+static pt_vec3 lamp_direction(const extent *e, const pt_camera *c)
 {
-    int light = pt_add_material(scene, pt_material_emitter(pt_rgb_grey((pt_real)radiance)));
-    pt_vec3 way = pt_v3_normalize(along(along(e->up, -0.8, c->right), -0.7, c->forward));
-    pt_frame f = pt_frame_from_normal(pt_v3_neg(way)); /* s x t = n, where a parallelogram emits */
-    pt_vec3 corner = along(along(along(e->centre, 4 * e->radius, way), -e->radius, f.s), -e->radius, f.t);
-
-    pt_add_parallelogram(scene, corner, pt_v3_scale(f.s, (pt_real)(2 * e->radius)), pt_v3_scale(f.t, (pt_real)(2 * e->radius)), light);
+    return pt_v3_normalize(along(along(e->up, -0.8, c->right), -0.7, c->forward));
 }
 
-static int add_sky(const tool *t, pt_scene *scene, const double radiance[3])
+/* Adds the lamp to a picture of the sky: a disc of a quarter of a steradian, cos = 1 - 0.25 / (2 pi). Being part of the
+   sky it needs no light of its own, and is sampled as much as its brightness deserves. */
+static void paint_lamp(float *rgb, int width, int height, pt_vec3 way, double radiance)
 {
-    pt_image image = PT_IMAGE_INIT;
+    int x, y, k;
 
-    if (!t->sky_image) {
+    for (y = 0; y < height; y++)
+        for (x = 0; x < width; x++) {
+            const double theta = (y + 0.5) / height * PT_PI, phi = ((x + 0.5) / width - 0.5) * 2 * PT_PI; /* see pt_set_environment_image */
+            pt_vec3 w = pt_v3((pt_real)(sin(theta) * sin(phi)), (pt_real)cos(theta), (pt_real)(-sin(theta) * cos(phi)));
+            if ((double)pt_v3_dot(w, way) < 1 - 0.25 / (2 * PT_PI)) continue;
+            for (k = 0; k < 3; k++) rgb[3 * ((size_t)y * (size_t)width + (size_t)x) + (size_t)k] += (float)radiance;
+        }
+}
+
+/* Lights the scene by a picture in memory and the lamp. */
+static void add_sky_picture(pt_scene *scene, pt_image *sky, pt_vec3 way, double lamp)
+{
+    if (lamp > 0) paint_lamp(sky->rgb, sky->width, sky->height, way, lamp);
+    pt_set_environment_image(scene, sky->rgb, sky->width, sky->height, 1);
+}
+
+/* A sky of one radiance. With a lamp it is a picture whose pixels are a degree wide. */
+static int add_even_sky(const tool *t, pt_scene *scene, const double radiance[3], pt_vec3 way, double lamp)
+{
+    enum { WIDTH = 360, HEIGHT = 180 };
+    pt_image sky = PT_IMAGE_INIT;
+    size_t i;
+
+    if (!(lamp > 0)) {
         pt_set_environment(scene, pt_rgb3((pt_real)radiance[0], (pt_real)radiance[1], (pt_real)radiance[2]));
         return 1;
     }
-    if (pt_read_image(t->sky_image, &image) != PT_OK) {
-        fprintf(stderr, "render: --sky '%s': cannot be read as a picture\n", t->sky_image);
-        return 0;
-    }
-    pt_set_environment_image(scene, image.rgb, image.width, image.height, 1);
-    pt_image_free(&image);
+    sky.width = WIDTH;
+    sky.height = HEIGHT;
+    sky.rgb = (float *)malloc(3 * (size_t)WIDTH * HEIGHT * sizeof *sky.rgb);
+    if (!sky.rgb) return subject_error(t, pt_result_string(PT_ERROR_MEMORY));
+    for (i = 0; i < 3 * (size_t)WIDTH * HEIGHT; i++) sky.rgb[i] = (float)radiance[i % 3];
+    add_sky_picture(scene, &sky, way, lamp);
+    free(sky.rgb);
     return 1;
 }
 
-/* The floor, the lamp and the sky that are asked for; without any light, a weak sky and a lamp. The two give a white
-   surface that faces the lamp a radiance just below 1. */
-static int light_model(const tool *t, pt_scene *scene, const extent *e, const pt_camera *c, int emits)
+/* --sky with a picture. */
+static int add_sky_file(const tool *t, pt_scene *scene, pt_vec3 way)
 {
-    static const double dim[3] = {0.35, 0.35, 0.35};
+    pt_image sky = PT_IMAGE_INIT;
 
-    if (t->sky.given && !add_sky(t, scene, t->sky.v)) return 0;
-    if (t->lamp > 0) add_lamp(scene, e, c, t->lamp);
-    if (!t->sky.given && !(t->lamp > 0) && !emits) {
-        fprintf(stderr, "render: %s has no light of its own: added a sky (--sky 0.35) and a lamp (--lamp 8)\n", t->words[0]);
-        add_sky(t, scene, dim);
-        add_lamp(scene, e, c, 8);
+    if (pt_read_image(t->sky_image, &sky) != PT_OK) {
+        fprintf(stderr, "render: --sky '%s': cannot be read as a picture\n", t->sky_image);
+        return 0;
     }
+    add_sky_picture(scene, &sky, way, t->lamp);
+    pt_image_free(&sky);
     return 1;
+}
+
+/* The sky and the lamp that are asked for; for a model without any light, a weak sky and a lamp, which give a white
+   surface that faces the lamp a radiance just below 1. */
+static int light_model(const tool *t, pt_scene *scene, pt_vec3 way, int emits)
+{
+    static const double dim[3] = {0.25, 0.25, 0.25};
+
+    if (t->sky_image) return add_sky_file(t, scene, way);
+    if (t->sky.given || t->lamp > 0) return add_even_sky(t, scene, t->sky.v, way, t->lamp);
+    if (emits) return 1;
+    fprintf(stderr, "render: %s has no light of its own: added a sky (--sky 0.25) and a lamp (--lamp 9)\n", t->words[0]);
+    return add_even_sky(t, scene, dim, way, 9);
 }
 
 /* ---- the subject ------------------------------------------------------------------------------------ */
@@ -232,7 +263,7 @@ static int make_model(tool *t, pt_scene *scene)
     t->desc.camera = frame_model(t, &e);
     if (!adjust_camera(t, e.centre, &t->desc.camera)) return 0;
     if (t->floor) add_floor(scene, &e);
-    return light_model(t, scene, &e, &t->desc.camera, info.emissive_triangles > 0) && commit_subject(t, scene);
+    return light_model(t, scene, lamp_direction(&e, &t->desc.camera), info.emissive_triangles > 0) && commit_subject(t, scene);
 }
 
 static int make_canonical(tool *t, pt_scene *scene)
