@@ -196,19 +196,45 @@ done
 quiet --compare p6-16.ppm c.png
 awk -v d="$(compared RMSE)" 'BEGIN { exit !(d > 0 && d < 0.5 / 255 * 2.28) }'
 check $? "16 bits against 8 bits: RMSE $(compared RMSE)"
-quiet cornell-spheres --size 40x30 --spp 16 --seed 1 --progress off --film seed.film && quiet --compare seed.film c.film
-worst=$(sed -n 's/.* worst \([-+0-9.e]*\) .*/\1/p' out)
-awk -v z="$worst" -v d="$(compared RMSE)" 'BEGIN { exit !(z != 0 && z < 5 && z > -5 && d > 0) }'
-check $? "other random numbers differ by their noise: worst z of blocks $worst"
-quiet cornell-spheres --size 40x30 --spp 16 --seed 1 --progress off --max-edges 2 --film short.film && quiet --compare short.film c.film
-worst=$(sed -n 's/.* worst \([-+0-9.e]*\) .*/\1/p' out)
-awk -v z="$worst" 'BEGIN { exit !(z < -5) }'
-check $? "direct light only is too dark, and blocks show it: worst z $worst"
+# z of blocks: of size 1 for other random numbers, and far off where light is missing.
+z_of() # FIELD: rms or worst
+{
+    sed -n "s/.* $1 \\([-+0-9.e]*\\).*/\\1/p" out
+}
+for seed in 1 2; do quiet cornell --size 64x64 --spp 8 --progress off --seed $seed --film z$seed.film; done
+quiet --compare z1.film z2.film
+awk -v r="$(z_of rms)" -v z="$(z_of worst)" 'BEGIN { exit !(r > 0.5 && r < 1.5 && z < 5 && z > -5) }'
+check $? "other random numbers differ by their noise: z of blocks, rms $(z_of rms), worst $(z_of worst)"
+quiet cornell --size 64x64 --spp 8 --progress off --max-edges 2 --film short.film && quiet --compare short.film z1.film
+awk -v z="$(z_of worst)" 'BEGIN { exit !(z < -5) }'
+check $? "direct light only is too dark, and blocks show it: worst z $(z_of worst)"
+quiet --compare z1.film z1.film && grep -q 'may share samples' out
+check $? 'films of the same samples: a line says that z is too small'
 quiet cornell-spheres --size 40x30 --spp 16 --reference c.pfm --progress off -o r.png && grep -q 'true RMSE' out &&
     awk '$1 == 16 { exit !($(NF - 1) < 1e-6) }' out
 check $? 'against itself as the reference the true error is the rounding to float'
 fails '40 x 30' cornell --size 8x8 --reference c.pfm
 fails '8 x 8' --compare f.film c.film
+
+# Emission alone, 1 everywhere: exposure 1/4 gives the sRGB byte of 1/4, 137.
+quiet furnace --size 8x8 --spp 2 --max-edges 1 --exposure 0.25 --progress off -o x.ppm
+[ "$(tail -c 192 x.ppm | od -An -v -t u1 | tr -s ' \n' '\n\n' | sort -u | tr -d '\n')" = 137 ]
+check $? '--exposure is a factor of the brightness'
+
+# Budgets, and where each ends. That of the error ends at a doubling, and so always at the same one.
+for budget in '--seconds 0.2:seconds' '--cpu-seconds 0.2:CPU seconds' '--error 0.3:error'; do
+    # shellcheck disable=SC2086
+    quiet cornell --size 24x24 --progress off -o b.png ${budget%:*}
+    grep -q "^stopped by ${budget#*:} at" out
+    check $? "${budget%:*}: $(grep '^stopped by' out)"
+done
+spp=$(sed -n 's/^stopped by error at \([0-9]*\) .*/\1/p' out)
+awk -v n="$spp" 'BEGIN { while (n > 1 && n % 2 == 0) n /= 2; exit n != 1 }'
+check $? "an error budget ends at a doubling: $spp"
+awk -v n="$spp" '$1 == n { now = $6 } $1 == n / 2 { before = $6 } END { exit !(now < 0.09 && before >= 0.09) }' out
+check $? 'the first one whose estimated relMSE is below 0.3^2'
+quiet cornell --size 24x24 --spp 9 --seconds 1000 --progress off -o b.png && grep -q '^stopped by samples at 9 ' out
+check $? 'samples and seconds: whichever is first'
 
 # Nobody reads stdout and stderr to the end: the pictures are written all the same.
 "$render" furnace --size 8x8 --spp 4 --progress off -o pipe.png 2>&1 | :
@@ -229,7 +255,7 @@ awk -v d="$(compared largest)" 'BEGIN { exit !(d < 1e-12) }'
 check $? "three shards merged are the whole within 1e-12: $(compared largest)"
 same_files 'and the same picture of the paths asked for' merged.png whole.png
 fails 'has samples that' --merge whole.film cornell-spheres-1-of-3.film -o no.png
-fails 'not the same picture' --merge c.film short.film -o no.png
+fails 'not the same picture' --merge z1.film short.film -o no.png
 fails 'its size differs' --merge c.film f.film -o no.png
 fails 'is a picture' --merge c.film c.png -o no.png
 [ ! -e no.png ]
@@ -402,6 +428,17 @@ check $? "scaled and moved it fills the picture as before: RMSE $(compared RMSE)
 quiet cube.obj --size 40x40 --spp 8 --progress off --rotate 0,45,0 --film turned.film --albedo turned.pfm && quiet --compare turned.pfm cube.pfm
 awk -v d="$(compared RMSE)" 'BEGIN { exit !(d > 0.05) }'
 check $? "turned it looks different: RMSE $(compared RMSE)"
+# A wedge, and the same with its vertices turned by hand: 90 degrees about x, then y, then z, send (x, y, z) to
+# (x, -z, y), (y, -z, -x), (z, y, -x).
+printf 'v 0 0 0\nv 3 0 0\nv 0 1 0\nv 0 0 2\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n' > wedge.obj
+awk '$1 == "v" { print "v", $4, $3, -$2; next } { print }' wedge.obj > by_hand.obj
+quiet wedge.obj --size 40x40 --spp 8 --progress off --rotate 90,90,90 -o w.png --normal turned.pfm && quiet by_hand.obj --size 40x40 --spp 8 --progress off -o w.png --normal hand.pfm &&
+    quiet --compare turned.pfm hand.pfm
+awk -v d="$(compared RMSE)" 'BEGIN { exit !(d < 0.02) }'
+check $? "--rotate 90,90,90 is as by hand: RMSE $(compared RMSE)"
+quiet wedge.obj --size 40x40 --spp 8 --progress off -o w.png --normal other.pfm && quiet --compare other.pfm hand.pfm
+awk -v d="$(compared RMSE)" 'BEGIN { exit !(d > 0.1) }'
+check $? "and not turned it differs: RMSE $(compared RMSE)"
 # Thrice as large: depths are three times as long.
 quiet cube.obj --size 40x40 --spp 8 --progress off --scale 3 --film moved.film --depth moved.pfm
 quiet --compare depth.pfm black.pfm && one=$(compared RMSE) && quiet --compare moved.pfm black.pfm
@@ -413,8 +450,9 @@ check $? 'with --sky nothing is added'
 quiet --merge sky.film -o sky.pfm && quiet --compare sky.pfm black.pfm
 awk '$1 == "RMSE" { r = $2 } END { exit !(r > 0.3 && r < 1) }' out
 check $? "a sky of radiance 1 lights it: RMSE from black $(compared RMSE)"
-quiet cube.obj --size 40x40 --spp 8 --progress off --floor --film floor.film --sky c.png && quiet --compare floor.film sky.film
-check $? 'a floor, and a picture as the sky'
+quiet cube.obj --size 40x40 --spp 8 --progress off --floor --film floor.film --sky c.png --albedo floor.pfm && quiet --compare floor.pfm cube.pfm
+awk '$1 == "mean" { exit !($3 > $5 + 0.05 && $3 < 0.5) }' out
+check $? "a floor of albedo 0.5, under a picture as the sky: $(grep mean out)"
 sed 's/usemtl red/usemtl lamp/' cube.obj > glow.obj
 quiet glow.obj --size 20x20 --spp 8 --progress off && ! grep -q 'no light' err
 check $? 'a model that emits keeps its own light alone'

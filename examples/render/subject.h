@@ -253,6 +253,7 @@ static int make_model(tool *t, pt_scene *scene)
     pt_result result;
     extent e;
 
+    memset(&e, 0, sizeof e);
     placement_of(t, options.transform);
     result = pt_load_obj(scene, t->words[0], &options, &info);
     if (result != PT_OK && info.error[0]) fprintf(stderr, "render: %s\n", info.error); /* it names the file */
