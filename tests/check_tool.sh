@@ -145,7 +145,8 @@ fails() # WORD ARGUMENT...
 }
 
 fails "'nowhere/a.png'" furnace -o nowhere/a.png
-fails 'no regular file' furnace --csv /dev/null
+mkdir directory
+fails 'no regular file' furnace --csv directory
 fails none.obj none.obj
 fails none.pfm furnace --reference none.pfm --size 8x8
 fails 'no such camera' furnace --eye 0,0,0 --look-at 0,0,0 --size 8x8 --spp 1
@@ -233,6 +234,11 @@ awk -v n="$spp" 'BEGIN { while (n > 1 && n % 2 == 0) n /= 2; exit n != 1 }'
 check $? "an error budget ends at a doubling: $spp"
 awk -v n="$spp" '$1 == n { now = $6 } $1 == n / 2 { before = $6 } END { exit !(now < 0.09 && before >= 0.09) }' out
 check $? 'the first one whose estimated relMSE is below 0.3^2'
+# Also where checkpoints cut the render into small steps.
+quiet cornell --size 60x45 --error 0.1 --checkpoint e --every 0.02 --progress off -o b.png
+spp=$(sed -n 's/^stopped by error at \([0-9]*\) .*/\1/p' out)
+awk -v n="$spp" 'BEGIN { while (n > 1 && n % 2 == 0) n /= 2; exit n != 1 }'
+check $? "in small steps too: $spp"
 quiet cornell --size 24x24 --spp 9 --seconds 1000 --progress off -o b.png && grep -q '^stopped by samples at 9 ' out
 check $? 'samples and seconds: whichever is first'
 
@@ -278,7 +284,7 @@ wait_for()
 }
 
 # SIGTERM: the passes that are finished are kept, in the checkpoint too.
-"$render" $long --spp 1000000 --checkpoint t --every 0.05 -o t.png > out 2> err &
+"$render" $long --seconds 20 --checkpoint t --every 0.05 -o t.png > out 2> err &
 process=$!
 wait_for t
 kill -TERM $process
@@ -287,6 +293,26 @@ status=$?
 [ $status = 143 ] && is_png t.png && grep -q 'interrupted; kept' err && grep -q 'stopped by a signal' out
 check $? "SIGTERM: status 143, and the picture is there: $(tail -n 1 err)"
 fails 'this checkpoint exists' $long --checkpoint t
+
+# ... also between steps that are shorter than the renderer asks, and within one that is long. (Both would end by
+# themselves.)
+"$render" furnace --size 8x8 --progress off --spp 100000000 --seconds 20 --checkpoint u --every 0.01 -o u.png > out 2> err &
+process=$!
+wait_for u
+kill -TERM $process
+wait $process
+status=$?
+[ $status = 143 ] && grep -q 'stopped by a signal' out
+check $? "SIGTERM between short steps: $(tail -n 1 err)"
+"$render" $long --spp 3000 --sampler stratified -o v.png > out 2> err &
+process=$!
+sleep 1
+kill -TERM $process
+wait $process
+status=$?
+[ $status = 143 ] && grep -q 'interrupted' err && ! grep -q ' 3000 samples' err
+check $? "SIGTERM within a long step: $(tail -n 1 err)"
+
 quiet $long --checkpoint t --resume --spp 4 -o t.png && grep -q 'resumed from' err
 check $? "a checkpoint beyond the budget is written as it is: $(head -n 1 err)"
 fails 'of another picture' $long --checkpoint t --resume --spp 4 --seed 1
@@ -332,6 +358,8 @@ rm -f k k.1 k.film
 quiet $long --spp 70 --checkpoint k && quiet $long --spp 160 --checkpoint k --resume --film k.film &&
     grep -q "resumed from 'k' at 70 samples" err
 check $? 'a render to 70 samples goes on to 160'
+awk '$1 == 160 { exit $NF != "unknown" }' out
+check $? 'its efficiency is unknown: the time before is'
 same_files 'the same bits' k.film undisturbed.film
 [ -s k.1 ]
 check $? 'the checkpoint before is kept'
@@ -428,14 +456,22 @@ check $? "scaled and moved it fills the picture as before: RMSE $(compared RMSE)
 quiet cube.obj --size 40x40 --spp 8 --progress off --rotate 0,45,0 --film turned.film --albedo turned.pfm && quiet --compare turned.pfm cube.pfm
 awk -v d="$(compared RMSE)" 'BEGIN { exit !(d > 0.05) }'
 check $? "turned it looks different: RMSE $(compared RMSE)"
-# A wedge, and the same with its vertices turned by hand: 90 degrees about x, then y, then z, send (x, y, z) to
-# (x, -z, y), (y, -z, -x), (z, y, -x).
+# A wedge, and the same with its vertices turned one axis after the other.
 printf 'v 0 0 0\nv 3 0 0\nv 0 1 0\nv 0 0 2\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n' > wedge.obj
-awk '$1 == "v" { print "v", $4, $3, -$2; next } { print }' wedge.obj > by_hand.obj
-quiet wedge.obj --size 40x40 --spp 8 --progress off --rotate 90,90,90 -o w.png --normal turned.pfm && quiet by_hand.obj --size 40x40 --spp 8 --progress off -o w.png --normal hand.pfm &&
+awk 'function turn(a) { c = cos(a * 0.017453292519943295); s = sin(a * 0.017453292519943295) }
+    $1 == "v" {
+        x = $2; y = $3; z = $4
+        turn(20); t = c * y - s * z; z = s * y + c * z; y = t
+        turn(35); t = c * x + s * z; z = c * z - s * x; x = t
+        turn(50); t = c * x - s * y; y = s * x + c * y; x = t
+        printf "v %.9g %.9g %.9g\n", x, y, z
+        next
+    }
+    { print }' wedge.obj > by_hand.obj
+quiet wedge.obj --size 40x40 --spp 8 --progress off --rotate 20,35,50 -o w.png --normal turned.pfm && quiet by_hand.obj --size 40x40 --spp 8 --progress off -o w.png --normal hand.pfm &&
     quiet --compare turned.pfm hand.pfm
 awk -v d="$(compared RMSE)" 'BEGIN { exit !(d < 0.02) }'
-check $? "--rotate 90,90,90 is as by hand: RMSE $(compared RMSE)"
+check $? "--rotate 20,35,50 is as by hand: RMSE $(compared RMSE)"
 quiet wedge.obj --size 40x40 --spp 8 --progress off -o w.png --normal other.pfm && quiet --compare other.pfm hand.pfm
 awk -v d="$(compared RMSE)" 'BEGIN { exit !(d > 0.1) }'
 check $? "and not turned it differs: RMSE $(compared RMSE)"
