@@ -218,9 +218,16 @@ fails '40 x 30' cornell --size 8x8 --reference c.pfm
 fails '8 x 8' --compare f.film c.film
 
 # Emission alone, 1 everywhere: exposure 1/4 gives the sRGB byte of 1/4, 137.
+bytes_of() # PPM of 8 x 8 pixels: the values that occur
+{
+    tail -c 192 "$1" | od -An -v -t u1 | tr -s ' \n' '\n\n' | sort -u | tr '\n' ' ' | sed 's/^ *//; s/ *$//'
+}
 quiet furnace --size 8x8 --spp 2 --max-edges 1 --exposure 0.25 --progress off -o x.ppm
-[ "$(tail -c 192 x.ppm | od -An -v -t u1 | tr -s ' \n' '\n\n' | sort -u | tr -d '\n')" = 137 ]
-check $? '--exposure is a factor of the brightness'
+[ "$(bytes_of x.ppm)" = 137 ]
+check $? "--exposure is a factor of the brightness: $(bytes_of x.ppm)"
+quiet furnace --size 8x8 --spp 2 --only LE --exposure 0.25 --progress off -o x.ppm
+[ "$(bytes_of x.ppm)" = 137 ]
+check $? "--only LE is the emission that the eye sees: $(bytes_of x.ppm)"
 
 # Budgets, and where each ends. That of the error ends at a doubling, and so always at the same one.
 for budget in '--seconds 0.2:seconds' '--cpu-seconds 0.2:CPU seconds' '--error 0.3:error'; do
@@ -239,6 +246,8 @@ quiet cornell --size 60x45 --error 0.1 --checkpoint e --every 0.02 --progress of
 spp=$(sed -n 's/^stopped by error at \([0-9]*\) .*/\1/p' out)
 awk -v n="$spp" 'BEGIN { while (n > 1 && n % 2 == 0) n /= 2; exit n != 1 }'
 check $? "in small steps too: $spp"
+awk '$1 + 0 == $1 && NF == 7 { if ($1 != (n ? 2 * n : 1)) bad = 1; n = $1 } END { exit bad || n < 16 }' out
+check $? 'the table has a row for each doubling, and no other'
 quiet cornell --size 24x24 --spp 9 --seconds 1000 --progress off -o b.png && grep -q '^stopped by samples at 9 ' out
 check $? 'samples and seconds: whichever is first'
 
@@ -355,7 +364,10 @@ same_files 'the same bits as undisturbed' k.film undisturbed.film
 
 # In two steps, without any luck: the checkpoint of 70 samples and what comes after it.
 rm -f k k.1 k.film
-quiet $long --spp 70 --checkpoint k && quiet $long --spp 160 --checkpoint k --resume --film k.film &&
+quiet $long --spp 70 --checkpoint k && cp k first_k
+fails "'k': this checkpoint exists" $long --spp 160 --checkpoint k
+same_files 'which is left as it was' k first_k
+quiet $long --spp 160 --checkpoint k --resume --film k.film &&
     grep -q "resumed from 'k' at 70 samples" err
 check $? 'a render to 70 samples goes on to 160'
 awk '$1 == 160 { exit $NF != "unknown" }' out
