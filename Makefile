@@ -46,7 +46,7 @@ FROM = 1
 SEEDS = 100
 TO = $(shell echo $$(($(FROM) + $(SEEDS) - 1)))
 
-.PHONY: all scenes lessons lesson-programs course exercises test test-long test-seeds test-table test-logs examples bench mutants stress fuzz clean help FORCE
+.PHONY: all scenes lessons lesson-programs course exercises test test-long test-seeds test-table test-logs examples bench report book mutants stress fuzz clean help FORCE
 # A program that was built only half is no program.
 .DELETE_ON_ERROR:
 
@@ -66,6 +66,8 @@ help:
 	@echo 'make exercises  build each lesson with each of its exercises, -DEX=1 and on, and run it; N=07 tries one'
 	@echo 'make examples   build and run the programs of examples/'
 	@echo 'make bench      rays per second, compile time, what leaving out saves; CSV on stdout'
+	@echo 'make report     error against run time of all scenes and methods: build/report/index.html; SCENE METHOD SECONDS=60'
+	@echo 'make book       the course as one page: build/book/index.html'
 	@echo 'make mutants    break the header, one change at a time; every broken copy must fail a check; GENERATED=n ALL=1'
 	@echo 'make stress     numbers at their ends, float and double side by side: table, build/stress.csv and .html (< 20 min)'
 	@echo 'make fuzz       hostile calls of every public function under sanitizers: SECONDS=10 of them'
@@ -210,6 +212,19 @@ build/test/check_%.log: tests/check_%.sh pathtracer.h FORCE
 
 build/bench: tests/bench/bench.c pathtracer.h build/flags
 	$(BUILD_C) tests/bench/bench.c -o $@ $(LDLIBS)
+
+# SCENE is that of plain make; here all scenes are the default.
+REPORT_SCENE = $(if $(filter command line environment,$(origin SCENE)),--scene $(SCENE))
+report: build/report/program
+	@mkdir -p build/report/references
+	build/report/program build/report --seconds $(if $(filter command line environment,$(origin SECONDS)),$(SECONDS),60) $(REPORT_SCENE) $(if $(METHOD),--method $(METHOD))
+
+build/report/program: tests/bench/report.c pathtracer.h build/flags
+	@mkdir -p build/report
+	$(BUILD_C) tests/bench/report.c -o $@ $(LDLIBS)
+
+book:
+	@sh lessons/book.sh build/book
 
 bench: build/bench
 	@CC='$(CC)' CFLAGS='$(CFLAGS)' build/bench

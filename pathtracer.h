@@ -114,6 +114,21 @@
        the same bits: a fused multiply-add rounds once where two operations round twice, and a
        compiler may fuse differently in each copy. Hits and misses of triangles do not depend on it.
 
+   LIMITS (`make stress` prints the figures, float and double side by side)
+
+       Coordinates and radii: up to PT_MAX_COORDINATE = 1e18; larger ones, infinity and NaN are refused
+       with a sentence. Hits and misses are those of exact arithmetic on the rounded input at scales
+       from 1e-45 to 1e30 and translations to 1e7, in every build.
+       Far from the origin: closed shapes are closed up to 10^6 of their own sizes away in float, 10^10 in
+       double. At 2^23 sizes a float can no longer tell the corners of a box from its middle; at
+       10^12 sizes, in double, 2 to 3 of 4,000 paths of 12 edges leave a box.
+       Solid angles: relative error below 1e-11 from 1e-12 sr to nearly 4 pi; a sphere seen from its own
+       surface 4e-8.
+       Albedo: roulette survives with at most 1 - 2^-24, so the mean is right up to that, and the
+       time of a path in a closed scene grows as 1 / (1 - albedo).
+       Radiance: 1e-9 to 1e9 in one picture to 15 digits in double, exactly in float; what a float
+       cannot hold (above 3.4e38) is infinite, counts as 0 and is reported (nonfinite).
+
    WHAT IT DOES NOT DO (today)
 
        Participating media, motion, spectra other than for making RGB values, light scattered more than
@@ -179,6 +194,10 @@
      defined(__ASSOCIATIVE_MATH__) || defined(__RECIPROCAL_MATH__) || defined(_M_FP_FAST)) && \
     !defined(PT_ALLOW_FAST_MATH)
 #error "pathtracer.h: -ffast-math and its kin remove the checks for NaN and the guarantees of [PT-06]; see PT_ALLOW_FAST_MATH"
+#endif
+#if ((defined(__FLT_EVAL_METHOD__) && (__FLT_EVAL_METHOD__ < 0 || __FLT_EVAL_METHOD__ > 1)) || \
+     (defined(_M_IX86_FP) && _M_IX86_FP < 2)) && !defined(PT_ALLOW_FAST_MATH)
+#error "pathtracer.h: x87 arithmetic rounds twice, and when it does is the compiler's; -msse2 -mfpmath=sse (/arch:SSE2) does not"
 #endif
 
 /* The switches, normalised once: below this table only PTI_HAS_X is asked. */
@@ -1594,7 +1613,7 @@ enum {
     PT_OBJ_NO_TEXTURES = 4   /* map_Kd is ignored                                                          */
 };
 
-/* How to load a model; zero means the default. */
+/* How to load a model; zero means the default. Start from PT_OBJ_OPTIONS_INIT. */
 typedef struct pt_obj_options {
     double transform[3][4];  /* rows of (A | t): p becomes A p + t; all zero = as it is. A needs an inverse; if it
                                 mirrors, corners are reordered, so that outside stays outside              */
@@ -1603,6 +1622,7 @@ typedef struct pt_obj_options {
     unsigned flags;          /* PT_OBJ_X                                                                   */
 } pt_obj_options;
 
+#define PT_OBJ_OPTIONS_INIT PTI_ZERO_INIT
 #define PT_OBJ_WARNINGS 8
 /* What was loaded, and what was not. */
 typedef struct pt_obj_info {
@@ -1632,7 +1652,7 @@ typedef struct pt_obj_info {
        Pr < 0.04                         diffuse Kd under a smooth coat of index Ni (1.5 without)
        Pr                                diffuse Kd and Blinn-Phong as wide as roughness Pr, of reflectance
                                          ((Ni - 1) / (Ni + 1))^2
-       Ks > 0, illum not 0 or 1          diffuse Kd and Phong with Ks and exponent Ns (energy-conserving)
+       Ks > 0, Ns > 0, illum not 0 or 1  diffuse Kd and Phong with Ks and exponent Ns (energy-conserving)
        else                              diffuse Kd
 
    Kd is 0.8 without a line, 1 if it is black or missing beside a map_Kd. Kd + Ks above 1 is scaled down, with a warning.
@@ -2469,7 +2489,7 @@ static uint32_t pti_permute(uint32_t i, uint32_t n, uint64_t seed)
     mask |= mask >> 4;
     mask |= mask >> 8;
     mask |= mask >> 16;
-    for (shift = 1; (mask >> (2 * shift)) != 0; shift++) {}
+    for (shift = 1; ((uint64_t)mask >> (2 * shift)) != 0; shift++) {}
     do {
         for (round = 0; round < 4; round++) {
             uint64_t key = pt_hash64(seed + round);
@@ -2477,7 +2497,7 @@ static uint32_t pti_permute(uint32_t i, uint32_t n, uint64_t seed)
             i ^= i >> shift;
         }
     } while (i >= n);
-    return (uint32_t)((i + pt_hash64(seed + 4) % n) % n); /* a random turn makes each value equally likely */
+    return (uint32_t)((i + pt_hash64(seed + 4) % n) % n); /* in 64 bits; a random turn makes each value equally likely */
 }
 
 /* Stratum `index` of `cells` in a random order; a new order each time all are used up. */
@@ -2929,7 +2949,7 @@ PTDEF pt_result pt_estimate_mis(const pt_integral *p, const pt_technique *techni
     memset(&e, 0, sizeof e);
     for (i = 0; ok && i < count; i++) {
         ok = counts[i] >= 0 && counts[i] <= 1024;
-        all += counts[i];
+        all += ok ? counts[i] : 0;
     }
     e.techniques = techniques;
     e.counts = counts;
@@ -7868,6 +7888,10 @@ PTDEF pt_rgbd pt_li_branching(const pt_scene *scene, const pt_ray *ray, pt_sampl
    compared with what is left of it, each index with what it points into, and each number with its range. Files of
    more than 2 GiB are refused, but for films. Numbers in texts are parsed here: strtod would obey the locale.
 
+   Models: one pass over the text, in time that grows as its length does. Each combination of v, vt and vn becomes one
+   vertex, found by its hash; a material is added when a face first needs it, and a picture is read once. Only cutting a
+   polygon that is not convex takes longer than its corners are many, and is therefore limited to 1024 of them.
+
    A film file: 64 bytes of head (see pti_film_head), the ranges of samples (first and end, 32 bits each), the sums as
    64-bit floats in the order of pti_film_plane, and the CRC-64 of all that [ECMA 182, reflected]. Everything is
    little-endian. A CRC finds every change within 8 consecutive bytes, and misses others once in 2^64. */
@@ -8213,7 +8237,7 @@ static int pti_film_is_whole(FILE *file, uint64_t size)
     return fread(chunk, 1, 8, file) == 8 && pti_get_little(chunk, 8) == ~crc.sum;
 }
 
-static int pti_film_get_doubles(FILE *file, double *values, size_t count)
+static int pti_get_doubles(FILE *file, double *values, size_t count)
 {
     unsigned char chunk[PTI_FILM_CHUNK];
     while (count > 0) {
@@ -8279,7 +8303,8 @@ static pt_result pti_film_read(FILE *file, pt_film *film)
     uint32_t planes;
     pt_result result;
     int k;
-    if (size < PTI_FILM_HEAD + 8 || fread(b, 1, PTI_FILM_HEAD, file) != PTI_FILM_HEAD || memcmp(b, "ptfilm\r\n", 8) != 0) return PT_ERROR_FILE;
+    if (size < PTI_FILM_HEAD + 8 || fread(b, 1, PTI_FILM_HEAD, file) != PTI_FILM_HEAD) return PT_ERROR_FILE;
+    if (memcmp(b, "ptfilm\r\n", 8) != 0) return PT_ERROR_FILE;
     rewind(file);
     if (!pti_film_is_whole(file, (uint64_t)size)) return PT_ERROR_FILE;
     if (pti_get_little(b + 8, 4) != PTI_FILM_FORMAT) return PT_ERROR_MISMATCH;
@@ -8293,7 +8318,7 @@ static pt_result pti_film_read(FILE *file, pt_film *film)
     if (fseek(file, PTI_FILM_HEAD, SEEK_SET) != 0 || !pti_film_get_ranges(file, film, head.range_count)) return PT_ERROR_FILE;
     for (k = 0; k < PTI_FILM_PLANES; k++) {
         double *values = *pti_film_plane(film, k, &channels);
-        if (values && !pti_film_get_doubles(file, values, (size_t)film->width * (size_t)film->height * channels)) return PT_ERROR_FILE;
+        if (values && !pti_get_doubles(file, values, (size_t)film->width * (size_t)film->height * channels)) return PT_ERROR_FILE;
     }
     return PT_OK;
 }
@@ -8335,15 +8360,10 @@ static int pti_merl_read_values(FILE *file, double *value)
 {
     unsigned char b[12];
     size_t i;
-    int k;
     if (fread(b, 1, 12, file) != 12 || memcmp(b, pti_merl_head, 12) != 0) return 0;
-    for (i = 0; i < 3 * (size_t)PT_MEASURED_CELLS; i++) {
-        uint64_t bits = 0;
-        if (fread(b, 1, 8, file) != 8) return 0;
-        for (k = 0; k < 8; k++) bits |= (uint64_t)b[k] << (8 * k);
-        memcpy(&value[i], &bits, 8);
+    if (!pti_get_doubles(file, value, 3 * (size_t)PT_MEASURED_CELLS)) return 0;
+    for (i = 0; i < 3 * (size_t)PT_MEASURED_CELLS; i++)
         if (!(fabs(value[i]) <= 1e30)) return 0; /* NaN, or no BRDF: sums and floats must hold it */
-    }
     return 1;
 }
 
@@ -8708,7 +8728,7 @@ static int pti_read_count(pti_bytes *b)
 /* P6 or P3 after these letters. A value has at least 1 byte, 2 as text or if it can be above 255. */
 static pt_result pti_read_ppm(pti_bytes *b, pt_image *image, int is_text)
 {
-    int width = pti_read_count(b), height = pti_read_count(b), most = pti_read_count(b), code = 0, bytes = is_text || most > 255 ? 2 : 1;
+    int width = pti_read_count(b), height = pti_read_count(b), most = pti_read_count(b), bytes = is_text || most > 255 ? 2 : 1, code = 0;
     size_t count, k;
     pti_levels levels;
     pt_result result;
@@ -8958,7 +8978,8 @@ static int pti_png_chunks(pti_png *p, unsigned char *file, size_t size)
     for (;;) {
         unsigned char *chunk = file + at, *d = chunk + 8;
         uint32_t length = size - at < 12 ? UINT32_MAX : pti_from_big_endian(chunk);
-        if (length > size - at || length + 12 > size - at || pti_crc32(0, chunk + 4, length + 4) != pti_from_big_endian(d + length)) return 0;
+        if (length > size - at || length + 12 > size - at) return 0;
+        if (pti_crc32(0, chunk + 4, length + 4) != pti_from_big_endian(d + length)) return 0;
         if (memcmp(chunk + 4, "IHDR", 4) == 0) {
             if (!pti_png_head(p, d, length)) return 0;
         } else if (p->depth == 0) {
@@ -8987,7 +9008,8 @@ typedef struct pti_png_pass {
 
 static pti_png_pass pti_png_pass_make(const pti_png *p, int k)
 {
-    static const unsigned char x[7] = {0, 4, 0, 2, 0, 1, 0}, y[7] = {0, 0, 4, 0, 2, 0, 1}, dx[7] = {8, 8, 4, 4, 2, 2, 1}, dy[7] = {8, 8, 8, 4, 4, 2, 2};
+    static const unsigned char x[7] = {0, 4, 0, 2, 0, 1, 0}, dx[7] = {8, 8, 4, 4, 2, 2, 1};
+    static const unsigned char y[7] = {0, 0, 4, 0, 2, 0, 1}, dy[7] = {8, 8, 8, 4, 4, 2, 2};
     pti_png_pass s = {0, 0, 1, 1, 0, 0, 0};
     if (p->is_interlaced) {
         s.x = x[k];
@@ -9006,11 +9028,13 @@ static int pti_png_unfilter(unsigned char *row, const unsigned char *up, size_t 
 {
     size_t k;
     int filter = row[-1];
+    if (filter > 4) return 0;
     for (k = 0; k < size; k++) {
         int a = k < pixel ? 0 : row[k - pixel], p = up ? up[k] : 0, c = up && k >= pixel ? up[k - pixel] : 0;
-        row[k] = (unsigned char)(row[k] + (filter == 0 ? 0 : filter == 1 ? a : filter == 2 ? p : filter == 3 ? (a + p) / 2 : pti_paeth(a, p, c)));
+        const int guess[5] = {0, a, p, (a + p) / 2, filter == 4 ? pti_paeth(a, p, c) : 0};
+        row[k] = (unsigned char)(row[k] + guess[filter]);
     }
-    return filter <= 4;
+    return 1;
 }
 
 /* Sample i of a row. */
@@ -9275,7 +9299,7 @@ typedef struct pti_mtl {
     int id;                  /* in the scene, -1: not yet                                                  */
 } pti_mtl;
 
-enum { PTI_MTL_KD = 1, PTI_MTL_KS = 2, PTI_MTL_KE = 4, PTI_MTL_NS = 8, PTI_MTL_NI = 16, PTI_MTL_D = 32, PTI_MTL_PR = 64, PTI_MTL_PM = 128, PTI_MTL_TR = 256, PTI_MTL_ILLUM = 512 };
+enum { PTI_MTL_KD = 1, PTI_MTL_NI = 16, PTI_MTL_D = 32, PTI_MTL_PR = 64, PTI_MTL_PM = 128, PTI_MTL_ILLUM = 512 };
 
 /* Its numbers, and the range that they are kept in: that of pt_material, of the format (Ni), or what fits a float. */
 static const struct {
@@ -9294,6 +9318,8 @@ typedef struct pti_picture {
     uint32_t path;
     pt_image image;
 } pti_picture;
+
+enum { PTI_TOLD_SCALED = 1, PTI_TOLD_NO_VT = 2, PTI_TOLD_SKIPPED = 4 };
 
 /* A loader. */
 typedef struct pti_obj {
@@ -9320,8 +9346,8 @@ typedef struct pti_obj {
     int mesh_count;
     int material;            /* of mtls, for the faces to come, -1: none                                   */
     int plain;               /* of the scene, for faces without, -1: not yet                               */
+    unsigned told;           /* PTI_TOLD_X: what is said once                                              */
 #if PTI_HAS_TEXTURES
-    int told;                /* that a face with a picture has no vt                                       */
     pti_picture *pictures;   /* that were read, owned by the scene                                         */
     uint32_t picture_count, picture_capacity;
 #endif
@@ -9350,23 +9376,40 @@ static void pti_obj_say(const pti_obj *o, char *text, const char *what, const ch
     pti_append(text, room, end);
 }
 
-static void pti_obj_warn(pti_obj *o, const char *what, const char *name, size_t size, const char *end)
+static void pti_obj_warn_of(pti_obj *o, const char *what, const char *name, size_t size, const char *end)
 {
-    if (o->info->warning_count < PT_OBJ_WARNINGS) pti_obj_say(o, o->info->warnings[o->info->warning_count], what, name, size, end);
-    o->info->warning_count++;
+    uint32_t n = o->info->warning_count++;
+    if (n < PT_OBJ_WARNINGS) pti_obj_say(o, o->info->warnings[n], what, name, size, end);
+}
+
+static void pti_obj_warn(pti_obj *o, const char *what)
+{
+    pti_obj_warn_of(o, what, "", 0, "");
+}
+
+/* A warning that is given once however often it is due. */
+static void pti_obj_tell_of(pti_obj *o, unsigned told, const char *name, size_t size, const char *end)
+{
+    if (!(o->told & told)) pti_obj_warn_of(o, "", name, size, end);
+    o->told |= told;
 }
 
 /* Ends the loading; returns 0. */
-static int pti_obj_fail(pti_obj *o, pt_result result, const char *what, const char *name, size_t size, const char *end)
+static int pti_obj_fail_of(pti_obj *o, pt_result result, const char *what, const char *name, size_t size, const char *end)
 {
     o->result = result;
     pti_obj_say(o, o->info->error, what, name, size, end);
     return 0;
 }
 
+static int pti_obj_fail(pti_obj *o, pt_result result, const char *what)
+{
+    return pti_obj_fail_of(o, result, what, "", 0, "");
+}
+
 static int pti_obj_no_memory(pti_obj *o)
 {
-    return pti_obj_fail(o, PT_ERROR_MEMORY, "out of memory", "", 0, "");
+    return pti_obj_fail(o, PT_ERROR_MEMORY, "out of memory");
 }
 
 /* Appends one element to an array of the loader, or fails. */
@@ -9395,6 +9438,10 @@ static uint32_t pti_obj_path(pti_obj *o, const char *name, size_t size)
     size_t n = strlen(o->file);
     uint32_t at, i;
     while (n > 0 && o->file[n - 1] != '/' && o->file[n - 1] != '\\') n--;
+    if (size > 2 && name[0] == '.' && (name[1] == '/' || name[1] == '\\')) {
+        name += 2;
+        size -= 2;
+    }
     if (name[0] == '/' || name[0] == '\\' || (size > 1 && name[1] == ':')) n = 0;
     at = pti_obj_keep(o, o->file, n);
     if (at > 0) o->pool_count--; /* goes on behind */
@@ -9415,7 +9462,8 @@ static pt_result pti_obj_open(pti_obj *o, const char *path, unsigned char **byte
     }
     if (result != PT_OK) return result;
     o->file = path;
-    o->text.at = (const char *)*bytes + (memcmp(*bytes, "\xef\xbb\xbf", size < 3 ? 0 : 3) == 0 && size >= 3 ? 3 : 0); /* byte order mark */
+    o->text.at = (const char *)*bytes;
+    if (strncmp(o->text.at, "\xef\xbb\xbf", 3) == 0) o->text.at += 3; /* a byte order mark */
     o->text.line = 1;
     return PT_OK;
 }
@@ -9474,10 +9522,11 @@ static int pti_mtl_begin(pti_obj *o)
 static void pti_mtl_number(pti_obj *o, pti_mtl *m, int key)
 {
     const char *name = pti_mtl_keys[key].key;
-    double v[3], *to = (double *)(void *)((char *)m + pti_mtl_keys[key].offset), lo = pti_mtl_keys[key].lo, hi = pti_mtl_keys[key].hi;
+    double v[3], *to = (double *)(void *)((char *)m + pti_mtl_keys[key].offset);
+    double lo = pti_mtl_keys[key].lo, hi = pti_mtl_keys[key].hi;
     int count = pti_mtl_keys[key].count, n = pti_take_numbers(&o->text, v, count), k, outside = 0;
     if (n != 1 && n != count) {
-        pti_obj_warn(o, "", name, strlen(name), " without its numbers is ignored");
+        pti_obj_warn_of(o, "", name, strlen(name), " without its numbers is ignored");
         return;
     }
     for (k = 0; k < count; k++) {
@@ -9485,14 +9534,15 @@ static void pti_mtl_number(pti_obj *o, pti_mtl *m, int key)
         outside |= !(to[k] >= lo && to[k] <= hi);
         to[k] = to[k] > lo ? (to[k] < hi ? to[k] : hi) : lo;
     }
-    if (outside) pti_obj_warn(o, "", name, strlen(name), " is out of range");
+    if (outside) pti_obj_warn_of(o, "", name, strlen(name), " is out of range");
     if (!(outside && 1 << key == PTI_MTL_NI)) m->given |= 1u << key;
 }
 
 /* map_Kd: options, then a name. -s u v is how often the picture is repeated; the others are skipped. */
 static int pti_mtl_map(pti_obj *o, pti_mtl *m)
 {
-    static const char *const options[12] = {"-s", "-o", "-t", "-mm", "-bm", "-clamp", "-blendu", "-blendv", "-cc", "-texres", "-imfchan", "-boost"};
+    static const char *const options[12] = {"-s",      "-o",      "-t",  "-mm",     "-bm",      "-clamp",
+                                            "-blendu", "-blendv", "-cc", "-texres", "-imfchan", "-boost"};
     const char *word;
     size_t size;
     for (;;) {
@@ -9511,7 +9561,7 @@ static int pti_mtl_map(pti_obj *o, pti_mtl *m)
             else break;
         }
         if (n == 0) pti_take_word(&o->text, &before.at);
-        if (k > 0) pti_obj_warn(o, "option ", word, size, " of map_Kd is skipped");
+        if (k > 0) pti_obj_warn_of(o, "option ", word, size, " of map_Kd is skipped");
         for (n = 0; k == 0 && n < 2; n++) m->scale[n] = fabs(v[n]) <= 1e6 ? v[n] : 1;
     }
     size = pti_take_rest(&o->text, &word);
@@ -9560,7 +9610,7 @@ static int pti_mtl_read(pti_obj *o, const char *name, size_t size)
         o->library = at;
         for (; *o->text.at && o->result == PT_OK; pti_next_line(&o->text))
             if (!pti_mtl_line(o)) break;
-        if (first == o->mtl_count) pti_obj_warn(o, "no newmtl in it", "", 0, "");
+        if (first == o->mtl_count) pti_obj_warn(o, "no newmtl in it");
         pti_free(bytes, o->scene->alloc_user);
     }
     pti_free(path, o->scene->alloc_user);
@@ -9579,7 +9629,7 @@ static int pti_obj_libraries(pti_obj *o)
     if ((o->options.flags & PT_OBJ_NO_MTL) || (size > 0 && pti_mtl_read(o, name, size))) return 1;
     o->text = line;
     while (o->result == PT_OK && (size = pti_take_word(&o->text, &name)) > 0)
-        if (!pti_mtl_read(o, name, size) && o->result == PT_OK) pti_obj_warn(o, "cannot read ", name, size, "");
+        if (!pti_mtl_read(o, name, size) && o->result == PT_OK) pti_obj_warn_of(o, "cannot read ", name, size, "");
     return o->result == PT_OK;
 }
 
@@ -9620,7 +9670,9 @@ static pt_material pti_mtl_glossy(pti_obj *o, const pti_mtl *s, pt_material_kind
     double most = 1;
     int k;
     for (k = 0; k < 3; k++) most = fmax(most, kd[k] + ks[k]);
-    if (most > 1) pti_obj_warn(o, "", o->pool + s->name, strlen(o->pool + s->name), ": diffuse and specular exceed 1 and are scaled down");
+    if (most > 1)
+        pti_obj_tell_of(o, PTI_TOLD_SCALED, o->pool + s->name, strlen(o->pool + s->name),
+                        ": diffuse and specular exceed 1 and are scaled down, here and elsewhere");
     m.albedo = pti_mtl_rgb(kd, 1 / most);
     m.specular = pti_mtl_rgb(ks, 1 / most);
     m.exponent = (pt_real)exponent;
@@ -9656,7 +9708,7 @@ static pt_material pti_mtl_surface(pti_obj *o, const pti_mtl *s)
     } else if (s->given & PTI_MTL_PR) {
         ks[0] = ks[1] = ks[2] = f0 * f0;
         m = pti_mtl_glossy(o, s, PT_MATERIAL_BLINN, kd, ks, 2 / (pr * pr * pr * pr) - 2);
-    } else if (pti_mtl_max(s->ks) > 0 && illum > 1) {
+    } else if (pti_mtl_max(s->ks) > 0 && s->ns > 0 && illum > 1) {
         m = pti_mtl_glossy(o, s, PT_MATERIAL_PHONG, kd, s->ks, s->ns);
     } else {
         m = pt_material_diffuse(pti_mtl_rgb(kd, 1));
@@ -9668,12 +9720,11 @@ static pt_material pti_mtl_surface(pti_obj *o, const pti_mtl *s)
 /* Gives a block to the scene; 0: no memory, the block is freed. */
 static int pti_scene_own(pt_scene *scene, void *block)
 {
-    if (block && pti_reserve(&scene->owned, &scene->owned_capacity, (size_t)scene->owned_count + 1, sizeof *scene->owned, scene->alloc_user)) {
-        scene->owned[scene->owned_count++] = block;
-        return 1;
-    }
-    pti_free(block, scene->alloc_user);
-    return 0;
+    void *user = scene->alloc_user;
+    int ok = block && pti_reserve(&scene->owned, &scene->owned_capacity, (size_t)scene->owned_count + 1, sizeof *scene->owned, user);
+    if (ok) scene->owned[scene->owned_count++] = block;
+    else pti_free(block, user);
+    return ok;
 }
 
 /* The picture of a path, read once; NULL: it cannot be read (a warning), or no memory. */
@@ -9689,7 +9740,10 @@ static const pt_image *pti_obj_picture(pti_obj *o, uint32_t path)
     p.path = path;
     p.image.alloc_user = o->scene->alloc_user;
     result = pt_read_image(name, &p.image);
-    if (result == PT_ERROR_FILE) pti_obj_warn(o, "no PPM, PFM or PNG: ", name, strlen(name), "; Kd alone is used");
+    if (result == PT_ERROR_FILE) {
+        const char *last = strrchr(name, '/') ? strrchr(name, '/') + 1 : name;
+        pti_obj_warn_of(o, "no PPM, PFM or PNG: ", last, strlen(last), "; Kd alone is used");
+    }
     if (result == PT_ERROR_MEMORY) pti_obj_no_memory(o);
     if (result != PT_OK) return NULL;
     for (i = 0; i < 3 * (size_t)p.image.width * (size_t)p.image.height; i++) { /* a reflectance; a PFM may hold anything */
@@ -9706,13 +9760,14 @@ static const pt_image *pti_obj_picture(pti_obj *o, uint32_t path)
 }
 #endif
 
-/* Lets the picture of map_Kd multiply the albedo; what has none goes without. */
+/* Lets the picture of map_Kd multiply the albedo; what does not come from Kd goes without. */
 static int pti_obj_texture(pti_obj *o, const pti_mtl *s, pt_material *m)
 {
+    int wanted = s->map > 0 && !(o->options.flags & PT_OBJ_NO_TEXTURES) && m->kind != PT_MATERIAL_DIELECTRIC && m->kind != PT_MATERIAL_MIRROR;
 #if PTI_HAS_TEXTURES
     const pt_image *image;
     pt_texture *t;
-    if (s->map == 0 || (o->options.flags & PT_OBJ_NO_TEXTURES) || m->kind == PT_MATERIAL_DIELECTRIC || m->kind == PT_MATERIAL_MIRROR) return 1;
+    if (!wanted) return 1;
     image = pti_obj_picture(o, s->map);
     if (!image) return o->result == PT_OK;
     t = (pt_texture *)pti_alloc_zero(1, sizeof *t, o->scene->alloc_user);
@@ -9723,7 +9778,7 @@ static int pti_obj_texture(pti_obj *o, const pti_mtl *s, pt_material *m)
     t->scale = pt_v2((pt_real)s->scale[0], (pt_real)s->scale[1]);
     m->texture = t;
 #else
-    if (s->map > 0 && !(o->options.flags & PT_OBJ_NO_TEXTURES) && m->kind != PT_MATERIAL_DIELECTRIC && m->kind != PT_MATERIAL_MIRROR)
+    if (wanted)
         pti_scene_fail(o->scene, PT_ERROR_LEFT_OUT, "material", o->scene->material_count, "textures were left out: PT_NO_TEXTURES");
 #endif
     return 1;
@@ -9734,7 +9789,7 @@ static int pti_obj_add_material(pti_obj *o, pt_material m)
 {
     int id = o->scene->error == PT_OK ? pt_add_material(o->scene, m) : -1;
     if (id >= 0) o->info->materials++;
-    else pti_obj_fail(o, o->scene->error, pt_scene_error(o->scene), "", 0, "");
+    else pti_obj_fail(o, o->scene->error, pt_scene_error(o->scene));
     return id;
 }
 
@@ -9775,7 +9830,7 @@ static int pti_obj_use(pti_obj *o)
     slot = pti_obj_name(o, name, size, &hash);
     if (!slot) return pti_obj_no_memory(o);
     o->material = (int)slot->id - 1;
-    if (slot->id == 0) pti_obj_warn(o, "no newmtl ", name, size, "");
+    if (slot->id == 0) pti_obj_warn_of(o, "no newmtl ", name, size, "");
     return 1;
 }
 
@@ -9787,13 +9842,13 @@ static int pti_obj_position(pti_obj *o)
     const double (*a)[4] = (const double (*)[4])o->options.transform;
     pt_vec3 v;
     int k;
-    if (pti_take_numbers(&o->text, p, 3) != 3) return pti_obj_fail(o, PT_ERROR_FILE, "'v' without three numbers", "", 0, "");
+    if (pti_take_numbers(&o->text, p, 3) != 3) return pti_obj_fail(o, PT_ERROR_FILE, "'v' without three numbers");
     for (k = 0; k < 3; k++) {
         q[k] = a[k][0] * p[0] + a[k][1] * p[1] + a[k][2] * p[2] + a[k][3];
-        if (!(fabs(q[k]) <= PT_MAX_COORDINATE)) return pti_obj_fail(o, PT_ERROR_FILE, "a coordinate beyond 1e18", "", 0, "");
+        if (!(fabs(q[k]) <= PT_MAX_COORDINATE)) return pti_obj_fail(o, PT_ERROR_FILE, "a coordinate beyond 1e18");
     }
     v = pt_v3((pt_real)q[0], (pt_real)q[1], (pt_real)q[2]);
-    if (pti_coordinate_bad(v, &bad)) return pti_obj_fail(o, PT_ERROR_FILE, "a coordinate beyond 1e18", "", 0, "");
+    if (pti_coordinate_bad(v, &bad)) return pti_obj_fail(o, PT_ERROR_FILE, "a coordinate beyond 1e18");
     return PTI_OBJ_PUSH(o, v, v_count, v_capacity, v);
 }
 
@@ -9807,7 +9862,7 @@ static int pti_obj_normal(pti_obj *o)
         n = pti_d_normalize(pti_d(c[0][0] * v[0] + c[0][1] * v[1] + c[0][2] * v[2], c[1][0] * v[0] + c[1][1] * v[1] + c[1][2] * v[2],
                                   c[2][0] * v[0] + c[2][1] * v[1] + c[2][2] * v[2]));
     if (!(pti_d_dot(n, n) > 0.5)) {
-        pti_obj_warn(o, "a normal that is 0 or no number: faces with it are flat", "", 0, "");
+        pti_obj_warn(o, "a normal that is 0 or no number: faces with it are flat");
         n = pti_d(0, 0, 0);
     }
     return PTI_OBJ_PUSH(o, vn, vn_count, vn_capacity, pti_d_to(n));
@@ -9817,7 +9872,7 @@ static int pti_obj_uv(pti_obj *o)
 {
     double v[2] = {0, 0};
     if (pti_take_numbers(&o->text, v, 2) < 1 || !(fabs(v[0]) <= PT_MAX_COORDINATE && fabs(v[1]) <= PT_MAX_COORDINATE)) {
-        pti_obj_warn(o, "'vt' that is no number or beyond 1e18 is taken as 0", "", 0, "");
+        pti_obj_warn(o, "'vt' that is no number or beyond 1e18 is taken as 0");
         v[0] = v[1] = 0;
     }
     return PTI_OBJ_PUSH(o, vt, vt_count, vt_capacity, pt_v2((pt_real)v[0], (pt_real)v[1]));
@@ -9831,7 +9886,7 @@ static int pti_obj_index(pti_obj *o, uint32_t count, uint32_t *index)
     uint64_t i = 0;
     for (p += minus; *p >= '0' && *p <= '9'; p++)
         if (i < 10000000000u) i = 10 * i + (uint64_t)(*p - '0');
-    if (i == 0 || i > count) return pti_obj_fail(o, PT_ERROR_FILE, "index ", word, strcspn(word, " \t\r\n"), " points nowhere");
+    if (i == 0 || i > count) return pti_obj_fail_of(o, PT_ERROR_FILE, "index ", word, strcspn(word, " \t\r\n"), " points nowhere");
     o->text.at = p;
     *index = (uint32_t)(minus ? count - i : i - 1);
     return 1;
@@ -9851,7 +9906,7 @@ static int pti_obj_corner(pti_obj *o)
         o->text.at++;
         if (!pti_word_ends(o->text.at) && !pti_obj_index(o, o->vn_count, &c.vn)) return 0;
     }
-    if (!pti_word_ends(o->text.at)) return pti_obj_fail(o, PT_ERROR_FILE, "no corner of a face: ", word, strcspn(word, " \t\r\n"), "");
+    if (!pti_word_ends(o->text.at)) return pti_obj_fail_of(o, PT_ERROR_FILE, "no corner of a face: ", word, strcspn(word, " \t\r\n"), "");
     return PTI_OBJ_PUSH(o, face, face_count, face_capacity, c);
 }
 
@@ -9914,7 +9969,8 @@ static int pti_obj_triangle(pti_obj *o, uint32_t i, uint32_t j, uint32_t k, int 
         t.v[n] += scene->position_count;
         pti_obj_widen(o->info, o->v[f[corner[n]].v]);
     }
-    if (!pti_reserve(&scene->triangles, &scene->triangle_capacity, (size_t)scene->triangle_count + 1, sizeof t, scene->alloc_user)) return pti_obj_no_memory(o);
+    if (!pti_reserve(&scene->triangles, &scene->triangle_capacity, (size_t)scene->triangle_count + 1, sizeof t, scene->alloc_user))
+        return pti_obj_no_memory(o);
     scene->triangles[scene->triangle_count++] = t;
     o->info->triangles++;
     if (!pti_rgb_black(scene->materials[material].emission)) o->info->emissive_triangles++;
@@ -9995,7 +10051,7 @@ static int pti_obj_cut(pti_obj *o, int material)
     }
     ears = o->info->triangles;
     for (i = 1; ok && i + 1 < n; i++) ok = pti_obj_triangle(o, ring[0], ring[i], ring[i + 1], material);
-    if (n > 3 && o->info->triangles > ears) pti_obj_warn(o, "a polygon that crosses itself: some of it is cut as a fan", "", 0, "");
+    if (n > 3 && o->info->triangles > ears) pti_obj_warn(o, "a polygon that crosses itself: some of it is cut as a fan");
     return ok;
 }
 
@@ -10006,7 +10062,7 @@ static int pti_obj_polygon(pti_obj *o, int material)
     if (n > 3) pti_obj_look(o);
     for (i = 0; convex && n > 3 && i < n; i++) convex = pti_obj_turn(o, i, (i + 1) % n, (i + 2) % n) > 0;
     if (!convex && n <= PTI_EARS_MAX) return pti_obj_cut(o, material);
-    if (!convex) pti_obj_warn(o, "a polygon of more than 1024 corners that is not convex is cut as a fan", "", 0, "");
+    if (!convex) pti_obj_warn(o, "a polygon of more than 1024 corners that is not convex is cut as a fan");
     for (i = 1; i + 1 < n; i++)
         if (!pti_obj_triangle(o, 0, i, i + 1, material)) return 0;
     return 1;
@@ -10031,10 +10087,8 @@ static int pti_obj_face(pti_obj *o)
     material = pti_obj_material(o);
     if (material < 0 || !pti_obj_polygon(o, material)) return 0;
 #if PTI_HAS_TEXTURES
-    if (!has_vt && !o->told && o->scene->materials[material].texture) {
-        pti_obj_warn(o, "a face without vt has a picture: each triangle shows its corner", "", 0, "");
-        o->told = 1;
-    }
+    if (!has_vt && o->scene->materials[material].texture)
+        pti_obj_tell_of(o, PTI_TOLD_NO_VT, "", 0, "a face with a picture has no vt, here and elsewhere: each triangle shows its corner");
 #endif
     if (o->info->triangles == before) o->info->degenerate_faces++;
     return 1;
@@ -10057,7 +10111,8 @@ static int pti_obj_line(pti_obj *o)
     if (pti_word_is(word, size, "usemtl")) return pti_obj_use(o);
     if (pti_word_is(word, size, "mtllib")) return pti_obj_libraries(o);
     if (pti_word_is(word, size, "g") || pti_word_is(word, size, "o") || pti_word_is(word, size, "s")) return 1;
-    if (o->info->skipped_lines++ == 0) pti_obj_warn(o, "", word, size, " is skipped, and what else is no face");
+    pti_obj_tell_of(o, PTI_TOLD_SKIPPED, word, size, " is skipped, and what else is no face");
+    o->info->skipped_lines++;
     return 1;
 }
 
@@ -10068,14 +10123,15 @@ static int pti_obj_read(pti_obj *o, const char *path)
     o->file = path ? path : "";
     result = pti_obj_open(o, path, &bytes);
     if (result == PT_ERROR_MEMORY) return pti_obj_no_memory(o);
-    if (result != PT_OK)
-        return pti_obj_fail(o, PT_ERROR_FILE, result == PT_ERROR_ARGUMENT ? "is larger than 2 GiB" : result == PT_ERROR_SCENE ? "is not a text" : "cannot be read", "", 0, "");
+    if (result == PT_ERROR_ARGUMENT) return pti_obj_fail(o, PT_ERROR_FILE, "is larger than 2 GiB");
+    if (result == PT_ERROR_SCENE) return pti_obj_fail(o, PT_ERROR_FILE, "is not a text");
+    if (result != PT_OK) return pti_obj_fail(o, PT_ERROR_FILE, "cannot be read");
     for (; *o->text.at && o->result == PT_OK; pti_next_line(&o->text))
         if (!pti_obj_line(o)) break;
     pti_free(bytes, o->scene->alloc_user);
     if (o->result == PT_OK && o->info->triangles == 0) {
         o->text.line = 0;
-        pti_obj_fail(o, PT_ERROR_FILE, "holds no triangle with an area", "", 0, "");
+        pti_obj_fail(o, PT_ERROR_FILE, "holds no triangle with an area");
     }
     return o->result == PT_OK;
 }
@@ -10089,19 +10145,22 @@ static int pti_obj_prepare(pti_obj *o)
         for (k = 0; k < 4; k++) zero = fmax(zero, a[i][k] == 0 ? 0 : 1); /* NaN too is not 0 */
     for (i = 0; zero == 0 && i < 3; i++) a[i][i] = 1;
     for (i = 0; i < 3; i++)
-        for (k = 0; k < 3; k++)
-            o->cofactor[i][k] = a[(i + 1) % 3][(k + 1) % 3] * a[(i + 2) % 3][(k + 2) % 3] - a[(i + 1) % 3][(k + 2) % 3] * a[(i + 2) % 3][(k + 1) % 3];
+        for (k = 0; k < 3; k++) {
+            const double *b = a[(i + 1) % 3], *c = a[(i + 2) % 3];
+            o->cofactor[i][k] = b[(k + 1) % 3] * c[(k + 2) % 3] - b[(k + 2) % 3] * c[(k + 1) % 3];
+        }
     for (k = 0; k < 3; k++) det += a[0][k] * o->cofactor[0][k];
-    if (det == 0 || !pti_finite(det) || !pti_finite(a[0][3] + a[1][3] + a[2][3])) return pti_obj_fail(o, PT_ERROR_ARGUMENT, "the transform is not finite or has no inverse", "", 0, "");
+    if (det == 0 || !pti_finite(det) || !pti_finite(a[0][3] + a[1][3] + a[2][3]))
+        return pti_obj_fail(o, PT_ERROR_ARGUMENT, "the transform is not finite or has no inverse");
     o->mirrors = det < 0;
     for (i = 0; o->mirrors && i < 3; i++)
         for (k = 0; k < 3; k++) o->cofactor[i][k] = -o->cofactor[i][k];
     if (!(o->options.emission_scale >= 0) || !pti_finite(o->options.emission_scale))
-        return pti_obj_fail(o, PT_ERROR_ARGUMENT, "the scale of the emission is negative or not finite", "", 0, "");
+        return pti_obj_fail(o, PT_ERROR_ARGUMENT, "the scale of the emission is negative or not finite");
     if (!(o->options.flags & PT_OBJ_MATERIAL)) return 1;
     o->plain = o->options.material;
     if (o->plain >= 0 && (uint32_t)o->plain < o->scene->material_count) return 1;
-    return pti_obj_fail(o, PT_ERROR_ARGUMENT, "the material of the options does not exist", "", 0, "");
+    return pti_obj_fail(o, PT_ERROR_ARGUMENT, "the material of the options does not exist");
 }
 
 /* Gives the vertices to the scene, for which all memory is asked first. Those without vt or vn have 0 there, and no
@@ -10167,7 +10226,7 @@ PTDEF pt_result pt_load_obj(pt_scene *scene, const char *path, const pt_obj_opti
     if (options) o.options = *options;
     memset(o.info, 0, sizeof *o.info);
     if (scene->error != PT_OK) {
-        pti_obj_fail(&o, scene->error, pt_scene_error(scene), "", 0, "");
+        pti_obj_fail(&o, scene->error, pt_scene_error(scene));
         return o.result;
     }
     if (pti_obj_prepare(&o) && pti_obj_read(&o, path)) pti_obj_finish(&o);
@@ -11067,7 +11126,7 @@ static void pti_svg_grid(pti_writer *w, const pti_axes *a)
         pti_svg_text(w, left - 8, pti_svg_y(a, v) + 4, "end", "", text);
     }
     pti_svg_text(w, (left + right) / 2, PTI_SVG_H - 14, "middle", "", "CPU seconds");
-    pti_svg_text(w, 16, (top + bottom) / 2, "middle", "transform=\"rotate(-90 16 192)\"", "square root of relMSE");
+    pti_svg_text(w, 16, (top + bottom) / 2, "middle", "transform=\"rotate(-90 16 212.5)\"", "square root of relMSE");
 }
 
 /* A dashed line of slope -1/2 through (x, y), cut to the axes. */

@@ -2,19 +2,24 @@
 
    QUESTION   How does a list of shapes become a picture?
 
-   IDEA       One ray for each pixel, backwards, from the eye into the scene. It asks each shape where it is
-              met, and the nearest meeting in front of the eye decides what the pixel shows.
+   IDEA       One ray for each pixel, backwards, from the eye of a camera into the scene. It asks each shape for an
+              intersection, and the nearest one in front of the eye decides what the pixel shows. With h the
+              vertical field of view and a the width of the picture over its height:
 
                   ray         o + t d,  d = forward + x a tan(h/2) right + y tan(h/2) up,  x, y in [-1, 1]
-                  sphere      |o + t d - c|^2 = r^2,  t = -b - sqrt(b^2 - q),  b = d.(o-c),  q = |o-c|^2 - r^2
-                  triangle    o + t d = v0 + u e1 + v e2  with u, v >= 0, u + v <= 1: Cramer's rule
+                  sphere      |o + t d - c|^2 = r^2, c its centre.  If |d| = 1:  t = -b - sqrt(b^2 - q),
+                              b = d.(o-c),  q = |o-c|^2 - r^2
+                  triangle    o + t d = v0 + u e1 + v e2  with u, v >= 0, u + v <= 1 (v0 a corner): Cramer's rule
 
-              Row 0 of a picture is its top, so y falls while the row rises. Light is computed in linear
-              numbers; a file holds sRGB codes, a curve close to a power of 1/2.2: half the light has code
-              188, not 128. How much of the picture does a shape cover? In the plane at distance 1 a ball on
-              the axis, at distance d, is a circle of radius r / sqrt(d^2 - r^2), a triangle parallel to the
-              picture at distance z is itself divided by z, and the picture has the area 4 a tan^2(h/2). So
-              the shares are known exactly, and counting random rays must give them.
+              Row 0 of a picture is its top, so y falls while the row rises. Light is computed in linear numbers; a
+              file holds sRGB codes, a curve close to a power of 1/2.2 (gamma correction): half the light has code
+              188, not 128. How much of the picture does a shape cover? The image plane at distance 1 shows the area
+              4 a tan^2(h/2). A ball of radius r at distance s, on the axis, is a circle of radius r / sqrt(s^2 - r^2)
+              there; a triangle parallel to the plane at distance z is 1/z as wide and as high, so its area is divided
+              by z^2. Here h = 40 degrees, a = 320/240, r = 1, s = z = 5, the triangle 1 wide and 2.25 high: of 0.7065
+              they cover pi/24 and 0.045, shares of 0.1853 and 0.06369, and counting random rays must give them.
+
+   PICTURE    Triangle and ball, coloured by their normals: red, green and blue are x, y and z, -1 dark and 1 bright.
 
    BUILD      cc -O2 -I.. 01_first_image.c -o 01_first_image -lm -pthread
    RUN        ./01_first_image [samples] [output]
@@ -49,7 +54,7 @@ static int passed, failed;
 
 static void check(int ok, const char *what)
 {
-    printf("%s %s\n", ok ? "ok    " : "FAIL  ", what);
+    printf("%-6s %s\n", ok ? "ok" : "FAIL", what);
     if (ok) passed++;
     else failed++;
 }
@@ -122,97 +127,81 @@ static int my_write_ppm(const char *path, const unsigned char *rgb)
 
 /* ---- both ---- */
 
-/* Which shape a ray meets first, 0 none, 1 ball, 2 triangle, by my functions or the header's. */
+/* Which shape a ray meets first, 0 none, 1 ball, 2 triangle, by my functions or the header's; and where. */
 static int nearest(const pt_ray *ray, int mine, double *t)
 {
-    double ball, flat, b[2];
-    int found = 0;
-    if (mine ? my_ball(ray, &ball) : pt_intersect_sphere(ray, pt_v3(0, 0, 0), 1, &ball)) {
-        found = 1;
-        *t = ball;
-    }
-    if ((mine ? my_triangle(ray, &flat)
-              : pt_intersect_triangle(ray, corner[0], corner[1], corner[2], &flat, b)) &&
-        (!found || flat < *t)) {
-        found = 2;
-        *t = flat;
-    }
-    return found;
+    double flat = 0, b[2];
+    int ball = mine ? my_ball(ray, t) : pt_intersect_sphere(ray, pt_v3(0, 0, 0), 1, t);
+    int triangle = mine ? my_triangle(ray, &flat)
+                        : pt_intersect_triangle(ray, corner[0], corner[1], corner[2], &flat, b);
+    if (!triangle || (ball && *t < flat)) return ball;
+    *t = flat;
+    return 2;
 }
 
 /* The share of the picture that shape 1 or 2 covers, by n random rays: a table row for each n. */
-static void table(int shape, const char *name, int mine, double most, double exact)
+static void table(const char *name, int shape, int mine, double exact, double most)
 {
     pt_camera camera = pt_camera_look_at(eye, pt_v3(0, 0, 0), pt_v3(0, 1, 0), (pt_real)vfov);
     pt_pcg32 random = pt_pcg32_make(1, (uint64_t)(2 * shape + mine));
     pt_stats s = PT_STATS_INIT;
-    double seconds = pt_cpu_seconds(), t, n;
-    for (n = floor(most / 256); n <= most; n *= 16) {
+    double seconds = pt_cpu_seconds(), t;
+    for (double n = floor(most / 256); n <= most; n *= 16) {
         while (s.n < n) {
             double x = pt_pcg32_double(&random), y = pt_pcg32_double(&random);
-            pt_ray ray =
-                mine ? my_camera_ray(x, y)
-                     : pt_camera_ray(&camera, (pt_real)WIDTH / HEIGHT, (pt_real)x, (pt_real)y, pt_v2(0, 0));
+            pt_ray ray = my_camera_ray(x, y);
+            if (!mine) ray = pt_camera_ray(&camera, (pt_real)WIDTH / HEIGHT, (pt_real)x, (pt_real)y, pt_v2(0, 0));
             pt_stats_add(&s, nearest(&ray, mine, &t) == shape);
         }
         row(name, &s, exact, pt_cpu_seconds() - seconds);
     }
-    check(fabs(s.mean - exact) <= 5 * pt_stats_standard_error(&s),
-          "within 5 standard errors of the exact share");
+    check(fabs(s.mean - exact) <= 5 * pt_stats_standard_error(&s), "within 5 standard errors of the exact share");
 }
 
-/* One ray through the middle of each pixel. The colour shows the normal: (n + 1) / 2. */
-static void picture(unsigned char *rgb)
-{
-    int i, k, shape;
-    for (i = 0; i < WIDTH * HEIGHT; i++) {
-        pt_ray ray = my_camera_ray((i % WIDTH + 0.5) / WIDTH, (i / WIDTH + 0.5) / HEIGHT);
-        double t = 0, c[3];
-        pt_vec3 n;
-        shape = nearest(&ray, 1, &t);
-        n = pt_v3(0, 0, 1); /* of the triangle; that of the ball is the point itself */
-        if (shape == 1) n = pt_v3_add(ray.o, pt_v3_scale(ray.d, (pt_real)t));
-        c[0] = 0.5 + 0.5 * (double)n.x;
-        c[1] = 0.5 + 0.5 * (double)n.y;
-        c[2] = 0.5 + 0.5 * (double)n.z;
-        for (k = 0; k < 3; k++)
-            rgb[3 * i + k] = my_srgb_byte(shape ? c[k] : 0.05 + 0.15 * i / (WIDTH * HEIGHT));
-    }
-}
-
-int main(int argc, char **argv)
+/* One ray through the middle of each pixel. The colour is that of the normal: (n + 1) / 2. */
+static void picture(const char *output)
 {
     static unsigned char rgb[WIDTH * HEIGHT * 3];
-    const char *output = argc > 2 ? argv[2] : "01_first_image";
-    double most = (argc > 1 ? fmax(atof(argv[1]), 4096) : 262144) / (getenv("SHORT") ? 16 : 1), t = 0;
-    double half = tan(vfov * PT_PI / 360), whole = 4 * half * half * WIDTH / HEIGHT;
-    double ball = PT_PI * 1 / (25 - 1) / whole, flat = 0.5 * 1 * 2.25 / 25 / whole;
-    pt_ray ray = my_camera_ray(0.5, 0.5);
     char path[1024];
-    int code, equal = 0;
-
-    printf("%-14s %9s %12s %12s %10s %8s\n", "shape", "samples", "estimate", "exact", "std.error", "seconds");
-    table(1, "my ball", 1, most, ball);
-    table(1, "pt ball", 0, most, ball);
-    table(2, "my triangle", 1, most, flat);
-    table(2, "pt triangle", 0, most, flat);
-    printf("What to see: 16 times the rays, 16 times the seconds, a quarter of the error.\n");
-
-    check(nearest(&ray, 1, &t) == 1 && fabs(t - 4) < 1e-5,
-          "the middle ray meets the ball first at distance 4");
-    for (code = 0; code < 256; code++) equal += my_srgb_byte(code / 255.0) == pt_srgb_byte(code / 255.0);
-    check(equal == 256, "my sRGB codes are the header's");
-    check(my_srgb_byte(0.5) == 188, "half the light has code 188");
-
-    picture(rgb);
+    for (int i = 0; i < WIDTH * HEIGHT; i++) {
+        pt_ray ray = my_camera_ray((i % WIDTH + 0.5) / WIDTH, (i / WIDTH + 0.5) / HEIGHT);
+        double t = 0, sky = 0.05 + 0.15 * i / (WIDTH * HEIGHT);
+        int shape = nearest(&ray, 1, &t);
+        pt_vec3 n = pt_v3(0, 0, 1); /* of the triangle; that of the ball is the point itself */
+        if (shape == 1) n = pt_v3_add(ray.o, pt_v3_scale(ray.d, (pt_real)t));
+        rgb[3 * i] = my_srgb_byte(shape ? 0.5 + 0.5 * (double)n.x : sky);
+        rgb[3 * i + 1] = my_srgb_byte(shape ? 0.5 + 0.5 * (double)n.y : sky);
+        rgb[3 * i + 2] = my_srgb_byte(shape ? 0.5 + 0.5 * (double)n.z : sky);
+    }
     snprintf(path, sizeof path, "%s.ppm", output);
     check(my_write_ppm(path, rgb), "the picture was written as PPM");
     snprintf(path, sizeof path, "%s.png", output);
     check(pt_write_png_bytes(path, rgb, WIDTH, HEIGHT) == PT_OK, "and by the header as PNG");
+}
+
+int main(int argc, char **argv)
+{
+    double most = (argc > 1 ? fmax(atof(argv[1]), 4096) : 262144) / (getenv("SHORT") ? 16 : 1), t = 0;
+    double half = tan(vfov * PT_PI / 360), whole = 4 * half * half * WIDTH / HEIGHT;
+    double ball = PT_PI * 1 / (25 - 1) / whole, triangle = 0.5 * 1 * 2.25 / 25 / whole;
+    pt_ray middle = my_camera_ray(0.5, 0.5);
+    int code, equal = 0;
+
+    printf("%-14s %9s %12s %12s %10s %8s\n", "shape", "samples", "estimate", "exact", "std.error", "seconds");
+    table("my ball", 1, 1, ball, most);
+    table("pt ball", 1, 0, ball, most);
+    table("my triangle", 2, 1, triangle, most);
+    table("pt triangle", 2, 0, triangle, most);
+    printf("What to see: 16 times the rays, 16 times the seconds, a quarter of the error.\n");
+
+    check(nearest(&middle, 1, &t) == 1 && fabs(t - 4) < 1e-5, "the middle ray meets the ball first, at distance 4");
+    for (code = 0; code < 256; code++) equal += my_srgb_byte(code / 255.0) == pt_srgb_byte(code / 255.0);
+    check(equal == 256, "my sRGB codes are the header's");
+    check(my_srgb_byte(0.5) == 188, "half the light has code 188");
+    picture(argc > 2 ? argv[2] : "01_first_image");
 
     printf("lesson 01: %d passed, %d failed\n", passed, failed);
-    if (MISTAKE)
-        printf("exercise %d is a mistake: %s\n", EX, failed ? "the checks noticed it" : "NOBODY NOTICED");
+    if (MISTAKE) printf("exercise %d is a mistake: %s\n", EX, failed ? "the checks noticed it" : "NOBODY NOTICED");
     return MISTAKE ? failed == 0 : failed != 0;
 }
 

@@ -1,39 +1,42 @@
 /* Lesson 08: warps
 
-   QUESTION   The computer has uniform numbers. How do they become directions with a wanted density, and who
-              notices if the density is another one?
+   QUESTION   The computer has uniform numbers. How do they become directions with a wanted density, and who notices
+              if the density is another one?
 
-   IDEA       Inversion: if P(x) is the integral of p up to x, then x = P^-1(u) has density p for uniform u.
-              For directions around a normal, with density proportional to cos^n,
+   IDEA       A warp turns numbers u, v that are uniform in [0, 1) into directions. Inversion: if P(x) is the
+              cumulative distribution, the integral of p up to x, then x = P^-1(u) has the probability density p. For
+              directions around a normal, with density proportional to cos^n,
 
                   p(w) = (n+1)/(2 pi) cos^n t per solid angle,   cos t = (1 - u)^(1/(n+1)),   phi = 2 pi v
 
-              n = 0 is the uniform hemisphere, n = 1 is Lambert's cosine. For the disk the same gives r =
-              sqrt(u), not r = u: a ring at radius r has a circumference that grows with r. Rejection: draw in
-              the square until the point is in the disk; pi/4 of the draws stay. The famous mistake: "normal +
-              random point in the unit ball" looks like a diffuse surface, and is not. The points on the ray
-              at angle t fill it up to length 2 cos t, so their density is proportional to the integral of r^2
-              up to there: p = (2/pi) cos^3 t, too dark at the rim. With a random point ON the sphere it is
-              right: that is cos t / pi exactly. Means tell some mistakes: E[cos t] = (n+1)/(n+2), that is
-              1/2, 2/3, and 4/5 for the mistake. All of them are told by counting directions in cells of equal
-              probability: the sum of (observed - expected)^2 / expected is distributed like chi-squared with
-              cells - 1 degrees of freedom, and p, the chance of a sum at least as large, is uniform if the
-              density is right and 0 if it is wrong.
+              n = 0 is the uniform hemisphere, n = 1 is Lambert's cosine law. For the disk the same gives r = sqrt(u),
+              not r = u: a ring at radius r has a circumference that grows with r. Rejection sampling: draw in the
+              square until the point is in the disk; pi/4 of the draws stay. The famous mistake: "normal + random point
+              in the unit ball" looks like a diffuse surface, and is not. The points on the ray at angle t fill it up
+              to length 2 cos t, so their density is proportional to the integral of r^2 up to there: p = (2/pi) cos^3
+              t, and light that comes in flat counts too little. With a random point ON the sphere it is right: that is
+              cos t / pi exactly.
+
+              Means tell some mistakes: E[cos t] = (n+1)/(n+2), that is 1/2, 2/3, and 4/5 for the mistake. All of them
+              are told by a chi-squared test: count directions in cells of equal probability; the sum of (observed -
+              expected)^2 / expected is distributed like chi-squared with cells - 1 degrees of freedom, and the
+              p-value, the chance of a sum at least as large, is uniform if the density is right and 0 if it is wrong.
+
+   PICTURE    2500 points each, from above: uniform directions and cosine (blue); the famous mistake and r = u (red).
 
    BUILD      cc -O2 -I.. 08_warps.c -o 08_warps -lm -pthread
    RUN        ./08_warps [samples] [output]
 
    PRINTS     mean             samples     estimate        exact  std.error  seconds
-              my cosine           1024     0.658245     0.666667     0.0074    0.000
+              my cosine           1024      0.66926     0.666667     0.0072    0.000
               ...
-              normal + in       262144     0.800133     0.666667    0.00032    0.039
+              normal + in       262144     0.800627     0.666667    0.00032    0.045
 
    WORDS      warp 变换采样; inversion 逆变换法; rejection sampling 拒绝采样; cumulative distribution 累积分布;
               probability density 概率密度; chi-squared test 卡方检验; diffuse 漫反射; hemisphere 半球;
               Lambert's cosine law 朗伯余弦定律
 
-   HEADER     [PT-04] pt_warp_cosine, pt_warp_hemisphere, pt_warp_disk, pt_warp_sphere, [PT-03]
-              pt_p_value_counts
+   HEADER     [PT-04] pt_warp_cosine, pt_warp_hemisphere, pt_warp_disk, pt_warp_sphere, [PT-03] pt_p_value_counts
 
    SOURCES    Malley: A Shading Method for Computer Generated Images, 1988; [Shi97]; [PBR] A.5; Shirley, Wang,
               Zimmerman: Monte Carlo Techniques for Direct Lighting Calculations, 1996
@@ -53,7 +56,7 @@ static int passed, failed;
 
 static void check(int ok, const char *what)
 {
-    printf("%s %s\n", ok ? "ok    " : "FAIL  ", what);
+    printf("%-6s %s\n", ok ? "ok" : "FAIL", what);
     if (ok) passed++;
     else failed++;
 }
@@ -66,59 +69,48 @@ static void row(const char *name, const pt_stats *s, double exact, double second
 
 /* ---- mine: each warp draws its own numbers; z is the axis ---- */
 
-static pt_vec2 pair(pt_pcg32 *random)
-{
-    double x = pt_pcg32_double(random);
-    return pt_v2((pt_real)x, (pt_real)pt_pcg32_double(random));
-}
-
 /* Density proportional to cos^n, by inversion. */
-static pt_vec3 my_power(pt_pcg32 *random, double n)
+static pt_vec3 my_power(pt_sampler *random, double n)
 {
-    double u = pt_pcg32_double(random), phi = 2 * PT_PI * pt_pcg32_double(random);
-    double z = pow(1 - u, 1 / (n + 1)), r = sqrt(1 - z * z);
+    pt_vec2 u = pt_sampler_2d(random);
+    double z = pow(1 - (double)u.x, 1 / (n + 1)), r = sqrt(1 - z * z), phi = 2 * PT_PI * (double)u.y;
     return pt_v3((pt_real)(r * cos(phi)), (pt_real)(r * sin(phi)), (pt_real)z);
 }
 
-static pt_vec3 my_hemisphere(pt_pcg32 *random) { return my_power(random, 0); }
-
-/* The disk by rejection; its third coordinate is not used. */
-static pt_vec3 my_disk(pt_pcg32 *random)
+/* Points of the cube (of the square, if flat) until one is in the ball (in the disk): rejection. */
+static pt_vec3 my_ball(pt_sampler *random, int flat)
 {
     for (;;) {
-        double x = 2 * pt_pcg32_double(random) - 1, y = 2 * pt_pcg32_double(random) - 1;
-        if (x * x + y * y < 1) return pt_v3((pt_real)x, (pt_real)y, 0);
+        pt_vec2 u = pt_sampler_2d(random);
+        pt_vec3 p = pt_v3(2 * u.x - 1, 2 * u.y - 1, flat ? 0 : 2 * pt_sampler_1d(random) - 1);
+        if (pt_v3_dot(p, p) < 1) return p;
     }
 }
 
 /* The disk as many write it first. */
-static pt_vec3 my_wrong_disk(pt_pcg32 *random)
+static pt_vec3 my_wrong_disk(pt_sampler *random)
 {
-    double r = pt_pcg32_double(random), phi = 2 * PT_PI * pt_pcg32_double(random);
-    return pt_v3((pt_real)(r * cos(phi)), (pt_real)(r * sin(phi)), 0);
+    pt_vec2 u = pt_sampler_2d(random);
+    double phi = 2 * PT_PI * (double)u.y;
+    return pt_v3(u.x * (pt_real)cos(phi), u.x * (pt_real)sin(phi), 0);
 }
 
 /* Normal + point in the unit ball: the famous mistake. */
-static pt_vec3 my_wrong_lambert(pt_pcg32 *random)
+static pt_vec3 my_wrong_lambert(pt_sampler *random)
 {
-    for (;;) {
-        double x = 2 * pt_pcg32_double(random) - 1, y = 2 * pt_pcg32_double(random) - 1;
-        double z = 2 * pt_pcg32_double(random) - 1;
-        if (x * x + y * y + z * z < 1)
-            return pt_v3_normalize(pt_v3((pt_real)x, (pt_real)y, (pt_real)(z + 1)));
-    }
+    return pt_v3_normalize(pt_v3_add(my_ball(random, 0), pt_v3(0, 0, 1)));
 }
 
 /* Normal + point on the unit sphere: right. */
-static pt_vec3 my_sphere_lambert(pt_pcg32 *random)
+static pt_vec3 my_sphere_lambert(pt_sampler *random)
 {
-    return pt_v3_normalize(pt_v3_add(pt_warp_sphere(pair(random)), pt_v3(0, 0, 1)));
+    return pt_v3_normalize(pt_v3_add(pt_warp_sphere(pt_sampler_2d(random)), pt_v3(0, 0, 1)));
 }
 
-static pt_vec3 my_cosine(pt_pcg32 *random)
-{
-    return EX == 2 ? my_wrong_lambert(random) : my_power(random, 1);
-}
+static pt_vec3 my_hemisphere(pt_sampler *random) { return my_power(random, 0); }
+static pt_vec3 my_narrow(pt_sampler *random) { return my_power(random, EX == 1 ? 100 : 19); }
+static pt_vec3 my_cosine(pt_sampler *random) { return EX == 2 ? my_wrong_lambert(random) : my_power(random, 1); }
+static pt_vec3 my_disk(pt_sampler *random) { return EX == 3 ? my_wrong_disk(random) : my_ball(random, 1); }
 
 /* The share of directions (of points of the disk, n < 0) that should be nearer to the axis than w. */
 static double my_cumulative(pt_vec3 w, double n)
@@ -128,42 +120,36 @@ static double my_cumulative(pt_vec3 w, double n)
 
 /* ---- the header's ---- */
 
-static pt_vec3 header_hemisphere(pt_pcg32 *random) { return pt_warp_hemisphere(pair(random)); }
-static pt_vec3 header_cosine(pt_pcg32 *random) { return pt_warp_cosine(pair(random)); }
-static pt_vec3 header_disk(pt_pcg32 *random)
+static pt_vec3 its_hemisphere(pt_sampler *random) { return pt_warp_hemisphere(pt_sampler_2d(random)); }
+static pt_vec3 its_cosine(pt_sampler *random) { return pt_warp_cosine(pt_sampler_2d(random)); }
+static pt_vec3 its_disk(pt_sampler *random)
 {
-    pt_vec2 p = pt_warp_disk(pair(random));
+    pt_vec2 p = pt_warp_disk(pt_sampler_2d(random));
     return pt_v3(p.x, p.y, 0);
 }
-
-static pt_vec3 disk(pt_pcg32 *random) { return EX == 3 ? my_wrong_disk(random) : my_disk(random); }
-static pt_vec3 narrow(pt_pcg32 *random) { return my_power(random, EX == 1 ? 100 : 19); }
 
 /* ---- both ---- */
 
 /* The mean of cos t (or, for the disk, of r), and the cells. right = 0: a mistake, which both must reject. */
-static void table(const char *name, pt_vec3 (*warp)(pt_pcg32 *), double n, int right, double most)
+static void table(const char *name, pt_vec3 (*warp)(pt_sampler *), double n, int right, double most)
 {
-    static double observed[CELLS], expected[CELLS];
-    pt_pcg32 random = pt_pcg32_make(12, 0);
+    pt_sampler random = pt_sampler_make(PT_SAMPLER_INDEPENDENT, 12, 0);
     pt_stats s = PT_STATS_INIT;
-    double seconds = pt_cpu_seconds(), k, p, exact = n < 0 ? 2 / 3.0 : (n + 1) / (n + 2);
-    int i, mean_right;
-    for (i = 0; i < CELLS; i++) observed[i] = expected[i] = 0;
-    for (k = floor(most / 256); k <= most; k *= 16) {
+    double seconds = pt_cpu_seconds(), exact = n < 0 ? 2 / 3.0 : (n + 1) / (n + 2);
+    double observed[CELLS] = {0}, expected[CELLS], p;
+    int mean_right;
+    for (double k = floor(most / 256); k <= most; k *= 16) {
         while (s.n < k) {
             pt_vec3 w = warp(&random);
-            double r = sqrt((double)w.x * (double)w.x + (double)w.y * (double)w.y);
-            int band = (int)(my_cumulative(w, n) * BANDS);
-            int sector = (int)((atan2((double)w.y, (double)w.x) / (2 * PT_PI) + 0.5) * SECTORS);
-            if (band > BANDS - 1) band = BANDS - 1; /* rounding */
-            if (sector > SECTORS - 1) sector = SECTORS - 1;
+            double turn = atan2((double)w.y, (double)w.x) / (2 * PT_PI) + 0.5;
+            int band = (int)fmin(my_cumulative(w, n) * BANDS, BANDS - 1); /* rounding may make one too many */
+            int sector = (int)fmin(turn * SECTORS, SECTORS - 1);
             observed[band * SECTORS + sector]++;
-            pt_stats_add(&s, n < 0 ? r : (double)w.z);
+            pt_stats_add(&s, n < 0 ? sqrt(my_cumulative(w, n)) : (double)w.z);
         }
         row(name, &s, exact, pt_cpu_seconds() - seconds);
     }
-    for (i = 0; i < CELLS; i++) expected[i] = s.n / CELLS;
+    for (int i = 0; i < CELLS; i++) expected[i] = s.n / CELLS;
     p = pt_p_value_counts(observed, expected, CELLS);
     mean_right = fabs(s.mean - exact) <= 5 * pt_stats_standard_error(&s);
     if (right) {
@@ -176,20 +162,19 @@ static void table(const char *name, pt_vec3 (*warp)(pt_pcg32 *), double n, int r
 static void picture(const char *output)
 {
     static unsigned char rgb[4 * SIZE * SIZE * 3];
-    static pt_vec3 (*const warp[4])(pt_pcg32 *) = {my_hemisphere, my_cosine, my_wrong_lambert, my_wrong_disk};
-    pt_pcg32 random = pt_pcg32_make(13, 0);
+    static pt_vec3 (*const warp[4])(pt_sampler *) = {my_hemisphere, my_cosine, my_wrong_lambert, my_wrong_disk};
+    pt_sampler random = pt_sampler_make(PT_SAMPLER_INDEPENDENT, 13, 0);
     char path[1024];
-    int panel, i;
     memset(rgb, 255, sizeof rgb);
-    for (panel = 0; panel < 4; panel++)
-        for (i = 0; i < 2500; i++) {
-            pt_vec3 w = warp[panel](&random);
-            int x = (int)(((double)w.x * 0.47 + 0.5) * SIZE) + panel % 2 * SIZE;
-            int y = (int)((0.5 - (double)w.y * 0.47) * SIZE) + panel / 2 * SIZE;
-            unsigned char *to = rgb + 3 * (y * 2 * SIZE + x);
-            to[1] = 60;
-            to[panel < 2 ? 0 : 2] = 0; /* right: blue, mistakes: red */
-        }
+    for (int i = 0; i < 4 * 2500; i++) {
+        int panel = i % 4;
+        pt_vec3 w = warp[panel](&random);
+        int x = (int)(((double)w.x * 0.47 + 0.5) * SIZE) + panel % 2 * SIZE;
+        int y = (int)((0.5 - (double)w.y * 0.47) * SIZE) + panel / 2 * SIZE;
+        unsigned char *to = rgb + 3 * (y * 2 * SIZE + x);
+        to[1] = 60;
+        to[panel < 2 ? 0 : 2] = 0; /* right: blue, mistakes: red */
+    }
     snprintf(path, sizeof path, "%s.ppm", output);
     check(pt_write_ppm_bytes(path, rgb, 2 * SIZE, 2 * SIZE) == PT_OK, "written as PPM");
     snprintf(path, sizeof path, "%s.png", output);
@@ -201,29 +186,28 @@ int main(int argc, char **argv)
     double most = (argc > 1 ? fmax(atof(argv[1]), 16384) : 262144) / (getenv("SHORT") ? 16 : 1);
     printf("%-14s %9s %12s %12s %10s %8s\n", "mean", "samples", "estimate", "exact", "std.error", "seconds");
     table("my hemisphere", my_hemisphere, 0, 1, most);
-    table("pt hemisphere", header_hemisphere, 0, 1, most);
+    table("pt hemisphere", its_hemisphere, 0, 1, most);
     table("my cosine", my_cosine, 1, 1, most);
-    table("pt cosine", header_cosine, 1, 1, most);
+    table("pt cosine", its_cosine, 1, 1, most);
     table("normal + on", my_sphere_lambert, 1, 1, most);
     table("normal + in", my_wrong_lambert, 1, 0, most);
-    table("narrow lobe", narrow, EX == 1 ? 100 : 19, 1, most);
-    table("my disk", disk, -1, 1, most);
-    table("pt disk", header_disk, -1, 1, most);
+    table("narrow lobe", my_narrow, EX == 1 ? 100 : 19, 1, most);
+    table("my disk", my_disk, -1, 1, most);
+    table("pt disk", its_disk, -1, 1, most);
     table("r = u", my_wrong_disk, -1, 0, most);
     printf("What to see: a mistake converges as fast as the truth, to something else.\n");
     picture(argc > 2 ? argv[2] : "08_warps");
+
     printf("lesson 08: %d passed, %d failed\n", passed, failed);
-    if (MISTAKE)
-        printf("exercise %d is a mistake: %s\n", EX, failed ? "the checks noticed it" : "NOBODY NOTICED");
+    if (MISTAKE) printf("exercise %d is a mistake: %s\n", EX, failed ? "the checks noticed it" : "NOBODY NOTICED");
     return MISTAKE ? failed == 0 : failed != 0;
 }
 
 /* EXERCISES
-   (1) Predict: the narrow lobe has n = 19 and E[cos t] = 20/21. With n = 100 (-DEX=1)? And half of its
-       directions are within which angle of the axis? Answer: 101/102 = 0.9902; cos t = 0.5^(1/101), t = 6.71
-       degrees.
-   (2) Break: take the famous mistake for the cosine (-DEX=2), or r = u for the disk (-DEX=3). Two checks fail
-       each time. How many samples does the mean need to notice? Answer: it is off by 0.8 - 0.6667 and one
-       cosine deviates by 0.163, so five standard errors are reached after 38 of them.
-   (3) Extend: points in a triangle: (1 - sqrt u, v sqrt u) as weights of corners 2 and 3. Means?
-       Answer: 1/3 each; with u instead of sqrt u they are 1/2 and 1/4. */
+   (1) Predict: the narrow lobe has n = 19 and E[cos t] = 20/21. With n = 100 (-DEX=1)? And half of its directions are
+       within which angle of the axis? Answer: 101/102 = 0.9902; cos t = 0.5^(1/101), t = 6.71 degrees.
+   (2) Break: take the famous mistake for the cosine (-DEX=2), or r = u for the disk (-DEX=3). Two checks fail each
+       time. How many samples does the mean need to notice? Answer: it is off by 0.8 - 0.6667 and one cosine deviates
+       by 0.163, so five standard errors are reached after 38 of them.
+   (3) Extend: points in a triangle: (1 - sqrt u, v sqrt u) as weights of corners 2 and 3. Means? Answer: 1/3 each;
+       with u instead of sqrt u they are 1/2 and 1/4. */

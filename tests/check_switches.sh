@@ -137,10 +137,27 @@ static void method(const char *name)
     pt_report_free(&report);
     pt_scene_free(&scene);
 }
+static void write_text(const char *name, const char *begin, const char *text)
+{
+    FILE *file = fopen(name, "w");
+    if (!file || fprintf(file, "%s%s\n", begin, text) < 0 || fclose(file) != 0) exit(1);
+}
+static void model(const char *lines)
+{
+    pt_scene scene = PT_SCENE_INIT;
+    pt_obj_info info;
+    pt_result result;
+    write_text(DIR "/model.mtl", "newmtl a\n", lines);
+    write_text(DIR "/model.obj", "mtllib model.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3", "");
+    result = pt_load_obj(&scene, DIR "/model.obj", NULL, &info);
+    refused(result == PT_ERROR_LEFT_OUT && strstr(info.error, SWITCH), lines, pt_scene_error(&scene));
+    pt_scene_free(&scene);
+}
 int main(void)
 {
     (void)material;
     (void)method;
+    (void)model;
     NEEDS
     return failures != 0;
 }
@@ -288,8 +305,10 @@ symbols()
     if object fixed one.c -fno-pie; then none 'no global that can be written to' 't ~ /^[BbDdCGgSs]$/' fixed; fi
     gone PT_NO_THREADS -DPT_NO_THREADS 'pthread_.*'
     gone PT_NO_STDIO -DPT_NO_STDIO \
-        'fopen|fwrite|f?puts|f?putc|fclose|f?printf|sn?printf|remove|rename|pt_report_print|pt_write_.*'
-    gone PT_NO_FILES -DPT_NO_FILES 'fopen|fclose|remove|rename|pt_write_.*|pt_report_write_.*'
+        'fopen|fwrite|f?puts|f?putc|fclose|f?printf|sn?printf|remove|rename|fsync|pt_report_print|pt_write_.*|pt_film_read'
+    gone PT_NO_FILES -DPT_NO_FILES \
+        'fopen|fclose|remove|rename|fsync|pt_write_.*|pt_read_image|pt_film_(read|write)|pt_load_obj|pt_report_write_.*|pti_(inflate|png|obj)_.*|pti_film_(head|put|plane)s?'
+    gone PT_NO_OBJ -DPT_NO_OBJ 'pt_load_obj|pti_(obj|mtl|table|take_number)_?.*'
     gone PT_NO_BVH -DPT_NO_BVH 'pti?_bvh_.*'
     gone PT_NO_ENVIRONMENT -DPT_NO_ENVIRONMENT 'pt_set_environment.*|pt_environment_radiance|pti_map_.*|pt_scene_pool'
     gone PT_NO_MICROFACET -DPT_NO_MICROFACET \
@@ -332,12 +351,17 @@ refusals()
     else
         skip "-ffast-math: $CC does not tell of it"
     fi
+    if echo | $CC -mfpmath=387 -dM -E - 2> /dev/null | grep -q '__FLT_EVAL_METHOD__ 2'; then
+        must_fail 'x87 arithmetic' 'x87' -mfpmath=387 "$dir/one.c"
+    else
+        skip "x87 arithmetic: $CC has none, or does not tell of it"
+    fi
 }
 
 # names SWITCH NEEDS: what the statements NEEDS ask for is refused with a sentence that names the switch
 names()
 {
-    if ! $CC -std=c99 -O0 -I. "-D$1" "-DSWITCH=\"$1\"" "-DNEEDS=$2" "$dir/needs.c" -o "$dir/needs" -lm -pthread > "$dir/needs.out" 2>&1; then
+    if ! $CC -std=c99 -O0 -I. "-D$1" "-DSWITCH=\"$1\"" "-DDIR=\"$dir\"" "-DNEEDS=$2" "$dir/needs.c" -o "$dir/needs" -lm -pthread > "$dir/needs.out" 2>&1; then
         bad "$1: the program that needs it does not compile"
         head -n 5 "$dir/needs.out"
     elif "$dir/needs" > "$dir/needs.out" 2>&1; then
@@ -350,9 +374,12 @@ names()
 left_out()
 {
     names PT_NO_MICROFACET 'material(PT_MATERIAL_CONDUCTOR, 0, "metal"); material(PT_MATERIAL_CONDUCTOR, 0.5, "rough metal");
-        material(PT_MATERIAL_DIELECTRIC, 0.5, "rough glass"); material(PT_MATERIAL_OREN_NAYAR, 0.3, "Oren-Nayar");'
-    names PT_NO_PHONG 'material(PT_MATERIAL_PHONG, 0, "Phong"); material(PT_MATERIAL_BLINN, 0, "Blinn-Phong");'
-    names PT_NO_COAT 'material(PT_MATERIAL_COAT, 0, "coat");'
+        material(PT_MATERIAL_DIELECTRIC, 0.5, "rough glass"); material(PT_MATERIAL_OREN_NAYAR, 0.3, "Oren-Nayar");
+        model("Pm 1"); model("illum 7\nPr 0.5"); model("illum 5\nKd 0\nKs 1\nPr 0.5");'
+    names PT_NO_PHONG 'material(PT_MATERIAL_PHONG, 0, "Phong"); material(PT_MATERIAL_BLINN, 0, "Blinn-Phong");
+        model("Kd 0.5\nKs 0.5\nNs 9"); model("Pr 0.5");'
+    names PT_NO_COAT 'material(PT_MATERIAL_COAT, 0, "coat"); model("Pr 0");'
+    names PT_NO_TEXTURES 'model("map_Kd nowhere.png");'
     names PT_NO_MEASURED 'material(PT_MATERIAL_MEASURED, 0, "measured");'
     names PT_NO_WHITTED 'method("local"); method("whitted"); method("distribution"); method("branching");'
     names PT_ONLY_PATH 'method("path-light"); method("path-plain");'

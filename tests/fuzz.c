@@ -12,16 +12,6 @@
 
 #include <stdlib.h>
 
-/* FUZZ_ALL takes back what is left out below: calls that are known to run away or overflow, each with its reason. */
-#ifdef FUZZ_ALL
-enum { MOST_STRATA = 0, MOST_COUNT = 2147483647 };
-#define LARGE_IMAGE "65536 65536"
-#else
-enum { MOST_STRATA = 2 };     /* more than 2^30 strata: a permutation shifts by as many bits as a word has */
-enum { MOST_COUNT = 100000 }; /* counts of techniques are added before they are refused */
-#define LARGE_IMAGE "4000 4000" /* memory is asked for before the file is found too short */
-#endif
-
 static pt_pcg32 rng;
 static unsigned long wrong;
 
@@ -137,7 +127,7 @@ static void samplers(void)
     for (i = 0; i < 4; i++) given[i] = hostile();
     s = one_in(4) ? pt_sampler_make_given(given, below(5))
                   : pt_sampler_make((pt_sampler_kind)below(3), pt_pcg32_next(&rng),
-                                    pt_pcg32_next(&rng) >> (MOST_STRATA + below(32 - MOST_STRATA)));
+                                    pt_pcg32_next(&rng) >> below(32));
     pt_sampler_start(&s, pt_pcg32_next(&rng), pt_pcg32_next(&rng));
     for (i = 0; i < 6; i++) {
         u = pt_sampler_2d(&s);
@@ -201,8 +191,8 @@ static void estimates(void)
     int counts[2];
     double shares[2];
     pt_estimate out;
-    counts[0] = one_in(4) ? hostile_int() % MOST_COUNT : 1;
-    counts[1] = one_in(4) ? hostile_int() % MOST_COUNT : 2;
+    counts[0] = one_in(4) ? hostile_int() : 1;
+    counts[1] = one_in(4) ? hostile_int() : 2;
     shares[0] = hostile();
     shares[1] = one_in(2) ? 1 - shares[0] : hostile();
     p.dimensions = one_in(3) ? hostile_int() : 1 + (int)below(4);
@@ -569,6 +559,14 @@ static void films(void)
     (void)pt_film_class(&a, hostile_int(), &b);
     (void)pt_film_error_estimate(&a, &error);
     (void)pt_film_pixel(&a, 0, 0);
+#if PTI_HAS_FILES
+    if (one_in(8)) {
+        const char *const path = "build/fuzz.film";
+        (void)pt_write_ppm_as(path, &a, hostile(), (pt_ppm_kind)hostile_int());
+        if (pt_film_write(path, &a) == PT_OK) wrong += pt_film_read(path, &b) != PT_OK || b.width != a.width;
+        remove(path);
+    }
+#endif
     pt_splat_list_free(&list);
     pt_film_free(&a);
     pt_film_free(&b);
@@ -578,7 +576,7 @@ static void films(void)
 static void files(void)
 {
     static const char *const heads[6] = {"P6\n3 2\n255\n", "PF\n3 2\n-1.0\n",
-                                         "PF\n3 2\n1.0\n", "P6\n" LARGE_IMAGE "\n255\n",
+                                         "PF\n3 2\n1.0\n", "P6\n65536 65536\n255\n",
                                          "PF\n-3 2\n0\n",  "P6 # x\n99999999999 1\n65536\n"};
     const char *const path = "build/fuzz.bin";
     unsigned char bytes[160];
@@ -599,6 +597,34 @@ static void files(void)
     else
         wrong += image.rgb != NULL;
     pt_image_free(&image);
+    remove(path);
+}
+#endif
+
+#if PTI_HAS_OBJ
+/* Small models that are in order, placed as nobody should. */
+static void models(void)
+{
+    const char *const path = "build/fuzz.obj";
+    pt_scene scene = PT_SCENE_INIT;
+    pt_obj_options options = PT_OBJ_OPTIONS_INIT;
+    pt_obj_info info;
+    pt_result result;
+    FILE *const file = fopen(path, "wb");
+    uint32_t i, k;
+    if (!file) return;
+    fprintf(file, "v %g %g %g\nv %g %g %g\nv %g 1 0\nv 0 %g 1\nvn %g %g %g\nvt %g %g\nf 1/1/1 2/1/1 3/1/1 4/1/1\nf 1 2 3\n",
+            hostile(), hostile(), hostile(), hostile(), hostile(), hostile(), hostile(), hostile(), hostile(), hostile(),
+            hostile(), hostile(), hostile());
+    fclose(file);
+    for (i = 0; i < 3; i++)
+        for (k = 0; k < 4; k++) options.transform[i][k] = one_in(3) ? hostile() : i == k;
+    options.emission_scale = one_in(2) ? hostile() : 1;
+    options.flags = below(8);
+    options.material = hostile_int();
+    result = pt_load_obj(&scene, path, &options, &info);
+    wrong += result == PT_OK ? pt_commit(&scene) != PT_OK || info.triangles != scene.triangle_count : info.error[0] == 0 || scene.triangle_count > 0;
+    pt_scene_free(&scene);
     remove(path);
 }
 #endif
@@ -629,6 +655,9 @@ static const target TARGETS[] = {{"shapes and rays", shapes, 64, 6},
                                  {"films", films, 8, 14},
 #if PTI_HAS_FILES
                                  {"image files", files, 1, 2},
+#endif
+#if PTI_HAS_OBJ
+                                 {"models", models, 4, 1},
 #endif
                                  {"scenes and pictures", scenes, 4, 60}};
 enum { TARGET_COUNT = sizeof TARGETS / sizeof TARGETS[0] };

@@ -352,7 +352,7 @@ static void boxes(void)
         told_count(label("box, %s", PLACES[p].name), "false misses", missed, n);
         stand_at(&PLACES[p]);
         if (PLACES[p].exponent < -100)
-            limited("1/d overflows where |d| < 2^-128: the slab is unbounded, which is conservative", 1);
+            limited("1/d overflows where abs(d) < 2^-128: the slab is unbounded, which is conservative", 1);
         told(label("box, %s", PLACES[p].name), "false hits, of 1", (double)extra / empty, 0,
              (double)extra / empty, "share", 0.001);
     }
@@ -567,6 +567,17 @@ static int broken_paths(const pt_scene *scene, pt_vec3 c, double size, int n)
    digits of pt_real. A float has 24: from 2^23 sizes away on, a box of size 1 has corners that round to others. */
 static const char *const BOX_LIMIT =
     "corners half a size from a centre 2^23 sizes away need 25 digits: the box itself is not closed any more";
+/* A float keeps the digits that its hit points lose in a second number; for double there is no wider one. A hit point
+   is off by up to 16 u of its coordinates ([PT-06]), and one that is nearer to one of the four edges of its square than
+   that may lie behind the wall next to it: of n points at most 4 * 16 u * 1.5 away n. */
+static const char *const DOUBLE_LIMIT =
+    "a hit point is off by 16 u of its distance from the origin, and so may lie behind the wall next to an edge";
+static void limit_of_box(double away, int paths)
+{
+    if (is_float() && away > 0x1p22) limited(BOX_LIMIT, paths);
+    if (!is_float() && away > 1e10) limited(DOUBLE_LIMIT, 12.0 * paths * 4 * 16 * 0x1p-53 * 1.5 * away);
+}
+
 static void furnaces(void)
 {
     static const int exponent[6] = {-13, -7, 0, 7, 13, 20};
@@ -581,12 +592,12 @@ static void furnaces(void)
                 const int n = many(4000, 200);
                 pt_scene scene;
                 int broken;
-                if (x > 1e17 || (kind != BALL && away[o] > (is_float() ? 1e6 : 1e12))) continue;
+                if (x > 1e17 || (kind != BALL && away[o] > (is_float() ? 1e7 : 1e12))) continue;
                 scene = make_furnace(kind, c, size);
                 broken = broken_paths(&scene, c, size, n);
                 STRESS.x = size;
                 STRESS.y = away[o];
-                if (is_float() && kind != BALL && away[o] > 0x1p22) limited(BOX_LIMIT, n);
+                if (kind != BALL) limit_of_box(away[o], n);
                 told_count(label("%s, size %.0e, %.0e sizes away", FURNACE_NAMES[kind], size, away[o]),
                            "paths that leak or meet their start", broken, n);
                 pt_scene_free(&scene);

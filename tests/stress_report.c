@@ -47,7 +47,7 @@ typedef struct output {
     } scene[MAX_SCENES];
     int scenes;
     char *later[MAX_LATER];
-    int laters, complete;
+    int laters, complete, lost; /* lost: rows that are not rows */
 } output;
 
 /* ---- reading ----------------------------------------------------------------------------------------- */
@@ -101,8 +101,10 @@ static int read_output(output *o, const char *path)
         if (strncmp(line, "stress: ", 8) == 0) o->complete = 1;
         if (strncmp(line, "later|", 6) == 0 && o->laters < MAX_LATER) o->later[o->laters++] = line + 6;
         if (strncmp(line, "twin|", 5) == 0 && cut(line, field) == 4) take_twin(o, field);
-        if (strncmp(line, "row|", 4) == 0 && o->rows < MAX_ROWS && cut(line, o->row[o->rows].field) == FIELDS)
-            o->rows++;
+        if (strncmp(line, "row|", 4) == 0) {
+            if (o->rows < MAX_ROWS && cut(line, o->row[o->rows].field) == FIELDS) o->rows++;
+            else o->lost++;
+        }
         if (!next) break;
     }
     return o->complete;
@@ -134,7 +136,7 @@ static const char *of(const half *h, int field) { return h ? h->field[field] : "
 static void print_row(const half *f, const half *d)
 {
     const half *const any = f ? f : d;
-    printf("%-10s %-46.46s %-30.30s %10s %-6.6s %8s %-6s %10s %8s %-6s %8s %8s\n", any->field[GROUP],
+    printf("%-10s %-46.46s %-30.30s %10s %-12.12s %8s %-6s %10s %8s %-6s %8s %8s\n", any->field[GROUP],
            any->field[NAME], any->field[QUANTITY], of(f, ERROR), any->field[UNIT], of(f, BOUND),
            of(f, VERDICT), of(d, ERROR), of(d, BOUND), of(d, VERDICT), of(f, SECONDS), of(d, SECONDS));
     if (f && f->field[WHY][0]) printf("           float: %s\n", f->field[WHY]);
@@ -425,7 +427,8 @@ static void count_verdicts(const output *o, const char *name, int *bad)
     }
     printf("%-7s %d rows: %d ok, %d limits, %d failed; %ld not finite; %.0f s\n", name, o->rows, ok, limit,
            fail, nan, seconds);
-    *bad += fail + (o->rows == 0) + !o->complete;
+    if (o->lost) printf("FAIL   %d rows of %s could not be read\n", o->lost, name);
+    *bad += fail + o->lost + (o->rows == 0) + !o->complete;
 }
 
 /* Both precisions in one list: the rows of float, then those that double alone has. */
@@ -465,7 +468,7 @@ int main(int argc, char **argv)
     }
     fprintf(csv, "\n");
     html_head(html, o);
-    printf("%-10s %-46s %-30s %10s %-6s %8s %-6s %10s %8s %-6s %8s %8s\n", "group", "case", "quantity",
+    printf("%-10s %-46s %-30s %10s %-12s %8s %-6s %10s %8s %-6s %8s %8s\n", "group", "case", "quantity",
            "float", "unit", "bound", "", "double", "bound", "", "s float", "s double");
     write_rows(o, csv, html);
     fprintf(html, "</table></body></html>\n");

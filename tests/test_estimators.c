@@ -1244,7 +1244,7 @@ static void refused_techniques(void)
     power_law flat = {0, 2};
     const pt_technique one = {power_warp, power_density, &flat};
     pt_technique t[9];
-    int counts[9] = {1, 1, 1, 1, 1, 1, 1, 1, 1}, none[2] = {0, 0}, negative[2] = {2, -1}, i;
+    int counts[9] = {1, 1, 1, 1, 1, 1, 1, 1, 1}, none[2] = {0, 0}, negative[2] = {2, -1}, i, huge[2] = {2147483647, 2147483647};
     double shares[9] = {0.5, 0.5, 0, 0, 0, 0, 0, 0, 0}, more[2] = {0.5, 0.75}, below[2] = {1.5, -0.5},
            nan_share[2] = {0.5, (double)NAN};
     const pt_heuristic h = PT_HEURISTIC_BALANCE;
@@ -1261,6 +1261,7 @@ static void refused_techniques(void)
     pt_check(refuses(pt_estimate_importance(&p, NULL, &e)), "NULL technique", "accepted");
     pt_check(refuses(pt_estimate_mis(&p, t, none, 2, h, &e)), "no samples of any technique", "accepted");
     pt_check(refuses(pt_estimate_mis(&p, t, negative, 2, h, &e)), "a negative number of samples", "accepted");
+    pt_check(refuses(pt_estimate_mis(&p, t, huge, 2, h, &e)), "counts whose sum overflows", "accepted");
     pt_check(refuses(pt_estimate_mis_one(&p, t, more, 2, h, &e)), "shares that sum to 1.25", "accepted");
     pt_check(refuses(pt_estimate_mis_one(&p, t, below, 2, h, &e)), "a negative share", "accepted");
     pt_check(refuses(pt_estimate_mis_one(&p, t, nan_share, 2, h, &e)), "a share that is NaN", "accepted");

@@ -486,6 +486,18 @@ static void strata(void)
             pt_check(strata_filled(&s, stream, 0, counts[i], 1, stream), "stratified, 1-D",
                      "%u samples leave a stratum empty", counts[i]);
         }
+    /* the largest counts, with strata of the size of their index: an order of 2^32 - 1 of them still ends */
+    for (i = 0; i < 4; i++) {
+        static const uint32_t most[4] = {0x40000001u, 0x80000000u, 0x80000001u, 0xffffffffu};
+        double sum = 0;
+        s = pt_sampler_make(PT_SAMPLER_STRATIFIED, 8, most[i]);
+        for (stream = 0; stream < 1000; stream++) {
+            pt_sampler_start(&s, stream / 10, most[i] - 1 - stream % 10);
+            sum += (double)pt_sampler_1d(&s);
+        }
+        pt_check(fabs(sum / 1000 - 0.5) < 6 / sqrt(12.0 * 1000), "stratified, 1-D",
+                 "%lu samples: mean %g of the last ten in 100 streams", (unsigned long)most[i], sum / 1000);
+    }
     for (i = 1; i <= 20; i++)
         for (stream = 0; stream < 20; stream++) {
             s = pt_sampler_make(PT_SAMPLER_STRATIFIED, 8, i * i);

@@ -384,7 +384,7 @@ typedef struct chain {
 
 static chain run_chain(const char *name, const walk *w, double rho, double q, uint32_t count)
 {
-    const uint32_t n = pt_test_samples(count);
+    const uint32_t n = pt_test_all_samples(count);
     const double mean = 1 / (1 - rho);
     pt_sampler s = pt_sampler_make(PT_SAMPLER_INDEPENDENT, seed_of(name, 0), 0);
     pt_li_info info;
@@ -433,7 +433,7 @@ static uint32_t chain_paths(double rho, double q) { return fabs(rho - q) < 1e-9 
 /* Paths of q = 0.99 have 100 edges. Roulette is drawn without the furnace for their variance. */
 static chain run_alone(const char *name, double rho, double q)
 {
-    const uint32_t n = pt_test_samples(1500000);
+    const uint32_t n = pt_test_all_samples(1500000);
     const double mean = 1 / (1 - rho);
     pt_pcg32 rng = pt_pcg32_make(seed_of(name, 1), 9);
     uint32_t i;
@@ -543,7 +543,7 @@ static void one_cavity(const row *r)
     c.f = parameter(r, "f");
     c.rho = parameter(r, "rho");
     c.q = parameter(r, "q");
-    n = pt_test_samples(c.f > 0.05 ? chain_paths(c.rho, c.q) : c.q > 0.8 ? 200000 : 1200000);
+    n = pt_test_all_samples(c.f > 0.05 ? chain_paths(c.rho, c.q) : c.q > 0.8 ? 200000 : 1200000);
     c.sphere = furnace(c.rho, 0);
     for (i = 0; i < n; i++) {
         double x, y;
