@@ -308,7 +308,7 @@ static pt_result run_steps(job *j)
         if (pt_film_spp(&j->film) == before) break; /* a path outlasted the time, or an error */
         if (result == PT_OK) save(j, 0);
     }
-    if (stopped || interrupted) j->report.stopped_by = stopped ? stopped : "a signal";
+    if (stopped || interrupted) j->report.stopped_by = stopped ? stopped : interrupted == SIGINT ? "Ctrl-C" : "a signal";
     return result;
 }
 
