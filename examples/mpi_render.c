@@ -129,7 +129,8 @@ static pt_result write_result(const work *w, const pt_film *film)
     pt_error error;
 
     if (result == PT_OK && pt_film_error_estimate(film, &error))
-        printf("%s: %d rank%s, %u samples per pixel, estimated relMSE %.6g\n", w->output, w->ranks, w->ranks == 1 ? "" : "s", (unsigned)pt_film_spp(film), error.relmse);
+        printf("%s: %d rank%s, %u samples per pixel, estimated relMSE %.6g\n", w->output, w->ranks,
+               w->ranks == 1 ? "" : "s", (unsigned)pt_film_spp(film), error.relmse);
     return result;
 }
 
@@ -153,7 +154,8 @@ int main(int argc, char **argv)
     MPI_Allreduce(&mine, &worst, 1, MPI_INT, MPI_MAX, MPI_COMM_WORLD); /* one that failed has nothing to send */
     if (worst == 0) worst = (int)reduce(&w, &film);
     if (worst == 0 && w.rank == 0) worst = (int)write_result(&w, &film);
-    if (worst != 0 && w.rank == 0) fprintf(stderr, "mpi_render: %s, %u samples: %s\n", w.scene, (unsigned)w.spp, pt_result_string((pt_result)worst));
+    if (worst != 0 && w.rank == 0)
+        fprintf(stderr, "mpi_render: %s, %u samples: %s\n", w.scene, (unsigned)w.spp, pt_result_string((pt_result)worst));
     pt_film_free(&film);
     MPI_Finalize();
     return worst != 0;

@@ -166,7 +166,8 @@ static double samples_in_time(const job *j, uint32_t done)
     time = 10;
     if (j->t->checkpoint) time = fmin(time, fmax(0, j->t->every - (pt_wall_seconds() - j->saved)));
     if (d->seconds > 0) time = fmin(time, d->seconds - (pt_wall_seconds() - j->start));
-    if (d->cpu_seconds > 0) time = fmin(time, (d->cpu_seconds - (pt_cpu_seconds() - j->cpu_start)) * wall / j->report.cpu_seconds);
+    if (d->cpu_seconds > 0)
+        time = fmin(time, (d->cpu_seconds - (pt_cpu_seconds() - j->cpu_start)) * wall / j->report.cpu_seconds);
     return time * made / wall;
 }
 
@@ -342,7 +343,8 @@ static int conclude(job *j, pt_result result)
 
     end_progress(j);
     if (result == PT_ERROR_MISMATCH && t->resume) {
-        file_error(t->checkpoint, "the checkpoint is of another picture: scene, camera, size, method, sampler, seed, layers, samples or version");
+        file_error(t->checkpoint, "the checkpoint is of another picture: "
+                                  "scene, camera, size, method, sampler, seed, layers, samples or version");
         return EXIT_FAILED;
     }
     if (result != PT_OK && result != PT_ERROR_CANCELLED) {
@@ -350,7 +352,8 @@ static int conclude(job *j, pt_result result)
         return EXIT_FAILED;
     }
     if (pt_film_spp(&j->film) == 0) {
-        fprintf(stderr, "render: %s before the first pass was finished; nothing is written\n", interrupted ? "interrupted" : "out of time");
+        fprintf(stderr, "render: %s before the first pass was finished; nothing is written\n",
+                interrupted ? "interrupted" : "out of time");
         return interrupted ? EXIT_SIGNAL + (int)interrupted : EXIT_FAILED;
     }
     ok = deliver(j);

@@ -157,8 +157,8 @@ check $? 'nothing was written that was not asked for'
 
 # ---- pictures ------------------------------------------------------------------------------------
 
-quiet cornell-spheres --size 40x30 --spp 16 --progress off -o c.png -o c.ppm -o c.pfm --film c.film --albedo a.pfm --normal n.png \
-    --depth d.ppm --error-map e.pfm --csv c.csv --svg c.svg
+quiet cornell-spheres --size 40x30 --spp 16 --progress off -o c.png -o c.ppm -o c.pfm --film c.film \
+    --albedo a.pfm --normal n.png --depth d.ppm --error-map e.pfm --csv c.csv --svg c.svg
 check $? 'all kinds of output'
 is_png c.png && is_png n.png && [ "$(head -c 12 c.ppm | tr '\n' ' ')" = 'P6 40 30 255' ] && grep -q '<svg' c.svg
 check $? 'they are what their names say'
@@ -388,7 +388,8 @@ for harm in byte half; do
     fi
     rm -f k.1 k.film
     quiet $long --spp 70 --film k.1
-    quiet $long --spp 160 --checkpoint k --resume --film k.film && grep -q "checkpoint 'k' is damaged" err && grep -q "resumed from 'k.1' at 70" err
+    quiet $long --spp 160 --checkpoint k --resume --film k.film && grep -q "checkpoint 'k' is damaged" err &&
+        grep -q "resumed from 'k.1' at 70" err
     check $? "a damaged checkpoint ($harm) is refused by name, and the one before is used"
     same_files 'to the same bits' k.film undisturbed.film
 done
@@ -449,11 +450,12 @@ f -6 -5 -1 -2
 f 1 5 8 4
 f 2 3 7 6
 END
-quiet cube.obj --size 40x40 --spp 8 --progress off
+quick='--size 40x40 --spp 8 --progress off'
+quiet cube.obj $quick
 status=$?
 [ $status = 0 ] && is_png cube.png && grep -q 'cube.obj has no light of its own: added a sky' err
 check $? "a model to a picture in one command: $(grep light err)"
-quiet cube.obj --size 40x40 --spp 8 --progress off --film cube.film --albedo cube.pfm --depth depth.pfm
+quiet cube.obj $quick --film cube.film --albedo cube.pfm --depth depth.pfm
 # Framed: the cube covers a good part of the picture, its red albedo times the coverage is the mean.
 { printf 'PF\n40 40\n-1.0\n'; dd if=/dev/zero bs=12 count=1600 2> /dev/null; } > black.pfm
 quiet --compare cube.pfm black.pfm
@@ -462,10 +464,10 @@ coverage=$(awk '$1 == "mean" { print $3 / 0.2488 }' out)
 awk -v c="$coverage" 'BEGIN { exit !(c > 0.3 && c < 0.95) }'
 check $? "the model is framed: it covers $coverage of the picture"
 # Moved, turned and scaled as a whole it looks the same: the camera follows, and albedo does not depend on light.
-quiet cube.obj --size 40x40 --spp 8 --progress off --scale 3 --translate 5,-7,1 --film moved.film --albedo moved.pfm && quiet --compare moved.pfm cube.pfm
+quiet cube.obj $quick --scale 3 --translate 5,-7,1 --film moved.film --albedo moved.pfm && quiet --compare moved.pfm cube.pfm
 awk -v d="$(compared RMSE)" 'BEGIN { exit !(d < 0.02) }'
 check $? "scaled and moved it fills the picture as before: RMSE $(compared RMSE)"
-quiet cube.obj --size 40x40 --spp 8 --progress off --rotate 0,45,0 --film turned.film --albedo turned.pfm && quiet --compare turned.pfm cube.pfm
+quiet cube.obj $quick --rotate 0,45,0 --film turned.film --albedo turned.pfm && quiet --compare turned.pfm cube.pfm
 awk -v d="$(compared RMSE)" 'BEGIN { exit !(d > 0.05) }'
 check $? "turned it looks different: RMSE $(compared RMSE)"
 # A wedge, and the same with its vertices turned one axis after the other.
@@ -480,25 +482,26 @@ awk 'function turn(a) { c = cos(a * 0.017453292519943295); s = sin(a * 0.0174532
         next
     }
     { print }' wedge.obj > by_hand.obj
-quiet wedge.obj --size 40x40 --spp 8 --progress off --rotate 20,35,50 -o w.png --normal turned.pfm && quiet by_hand.obj --size 40x40 --spp 8 --progress off -o w.png --normal hand.pfm &&
+quiet wedge.obj $quick --rotate 20,35,50 -o w.png --normal turned.pfm &&
+    quiet by_hand.obj $quick -o w.png --normal hand.pfm &&
     quiet --compare turned.pfm hand.pfm
 awk -v d="$(compared RMSE)" 'BEGIN { exit !(d < 0.02) }'
 check $? "--rotate 20,35,50 is as by hand: RMSE $(compared RMSE)"
-quiet wedge.obj --size 40x40 --spp 8 --progress off -o w.png --normal other.pfm && quiet --compare other.pfm hand.pfm
+quiet wedge.obj $quick -o w.png --normal other.pfm && quiet --compare other.pfm hand.pfm
 awk -v d="$(compared RMSE)" 'BEGIN { exit !(d > 0.1) }'
 check $? "and not turned it differs: RMSE $(compared RMSE)"
 # Thrice as large: depths are three times as long.
-quiet cube.obj --size 40x40 --spp 8 --progress off --scale 3 --film moved.film --depth moved.pfm
+quiet cube.obj $quick --scale 3 --film moved.film --depth moved.pfm
 quiet --compare depth.pfm black.pfm && one=$(compared RMSE) && quiet --compare moved.pfm black.pfm
 awk -v a="$one" -v b="$(compared RMSE)" 'BEGIN { exit !(a > 0 && b / a > 2.99 && b / a < 3.01) }'
 check $? "three times as large it is three times as far: $one, $(compared RMSE)"
-quiet cube.obj --size 40x40 --spp 8 --progress off --sky 1 --film sky.film && ! grep -q 'no light' err
+quiet cube.obj $quick --sky 1 --film sky.film && ! grep -q 'no light' err
 check $? 'with --sky nothing is added'
 # Under a sky of 1 alone no value is above 1, and what misses the cube is 1.
 quiet --merge sky.film -o sky.pfm && quiet --compare sky.pfm black.pfm
 awk '$1 == "RMSE" { r = $2 } END { exit !(r > 0.3 && r < 1) }' out
 check $? "a sky of radiance 1 lights it: RMSE from black $(compared RMSE)"
-quiet cube.obj --size 40x40 --spp 8 --progress off --floor --film floor.film --sky c.png --albedo floor.pfm && quiet --compare floor.pfm cube.pfm
+quiet cube.obj $quick --floor --film floor.film --sky c.png --albedo floor.pfm && quiet --compare floor.pfm cube.pfm
 awk '$1 == "mean" { exit !($3 > $5 + 0.05 && $3 < 0.5) }' out
 check $? "a floor of albedo 0.5, under a picture as the sky: $(grep mean out)"
 sed 's/usemtl red/usemtl lamp/' cube.obj > glow.obj
@@ -508,6 +511,17 @@ quiet cornell --size 20x20 --spp 4 --progress off --eye 278,273,-800 --look-at 2
     quiet cornell --size 20x20 --spp 4 --progress off --fov 20 --film narrow.film && quiet --compare narrow.film lens.film
 awk -v d="$(compared RMSE)" 'BEGIN { exit !(d > 0.01) }'
 check $? 'the camera of a canonical scene can be moved'
+# The lamp is left above the eye: a wall that faces left is brighter than one that faces right, and so is the upper side
+# of a roof than its lower one.
+for side in '-1 0' '1 0' '0 1' '0 -1'; do # x and y of a normal whose z is 1
+    echo "$side" | awk '
+        function corner(x, y) { print "v", x, y, -($1 * x + $2 * y) }
+        { corner(-1, -1); corner(1, -1); corner(1, 1); corner(-1, 1); print "f 1 2 3 4" }' > side.obj
+    quiet side.obj $quick --sky 0 --lamp 9 --eye 0,0,20 --fov 15 --film side.film && quiet --compare side.film side.film &&
+        awk '$1 == "mean" { print $3 }' out
+done > sides
+awk '{ v[NR] = $1 } END { exit !(NR == 4 && v[1] > 1.2 * v[2] && v[3] > 1.2 * v[4]) }' sides
+check $? "light comes from the left and from above: $(tr '\n' ' ' < sides)"
 printf 'v 0 0 0\nv 1 0 0\nf 1 2 7\n' > wrong.obj
 fails wrong.obj wrong.obj
 

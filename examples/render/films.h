@@ -106,10 +106,10 @@ static pt_result film_of_picture(const char *path, pt_film *film)
 {
     pt_image image = PT_IMAGE_INIT;
     pt_result result = pt_read_image(path, &image);
-    size_t k;
+    size_t k, n = 3 * (size_t)image.width * (size_t)image.height;
 
     if (result == PT_OK) result = pt_film_make(film, image.width, image.height, 0);
-    for (k = 0; result == PT_OK && k < 3 * (size_t)image.width * (size_t)image.height; k++) film->half[0][k] = (double)image.rgb[k];
+    for (k = 0; result == PT_OK && k < n; k++) film->half[0][k] = (double)image.rgb[k];
     if (result == PT_OK) film->samples[0] = 1;
     pt_image_free(&image);
     return result;
@@ -156,7 +156,8 @@ static float *read_reference(const char *path, int width, int height)
 
     if (read_any(path, &film)) {
         if (film.width != width || film.height != height)
-            fprintf(stderr, "render: --reference '%s': is %d x %d pixels, the picture %d x %d\n", path, film.width, film.height, width, height);
+            fprintf(stderr, "render: --reference '%s': is %d x %d pixels, the picture %d x %d\n", path, film.width,
+                    film.height, width, height);
         else if ((rgb = floats_of(&film)) == NULL) file_error(path, pt_result_string(PT_ERROR_MEMORY));
     }
     pt_film_free(&film);
@@ -173,7 +174,8 @@ static int merge_one(const char *path, pt_film *sum)
 
     if (is_picture_name(path)) return file_error(path, "is a picture; only films can be merged");
     if (!read_any(path, &film)) return 0;
-    if (sum->width != film.width || sum->height != film.height) file_error(path, "its size differs from that of the films before");
+    if (sum->width != film.width || sum->height != film.height)
+        file_error(path, "its size differs from that of the films before");
     else if (sum->fingerprint != film.fingerprint)
         file_error(path, "not the same picture: scene, camera, method, sampler, seed, precision or version differ");
     else if (pt_film_merge(sum, &film) != PT_OK) file_error(path, "has samples that a film before has too, or other layers");
@@ -199,7 +201,8 @@ static void describe_film(const pt_film *film, int parts)
 {
     pt_error e;
 
-    printf("%d film%s, %d x %d pixels, %u samples per pixel", parts, parts == 1 ? "" : "s", film->width, film->height, (unsigned)pt_film_spp(film));
+    printf("%d film%s, %d x %d pixels, %u samples per pixel", parts, parts == 1 ? "" : "s", film->width, film->height,
+           (unsigned)pt_film_spp(film));
     if (film->range_count > 1) printf(" in %u ranges: some are missing", (unsigned)film->range_count);
     if (pt_film_error_estimate(film, &e)) printf("; estimated RMSE %.6g, relMSE %.6g", e.rmse, e.relmse);
     printf("\n");
@@ -348,7 +351,8 @@ static int run_compare(const tool *t)
     int ok = read_any(t->words[0], &a) && read_any(t->words[1], &b);
 
     if (ok && (a.width != b.width || a.height != b.height)) {
-        fprintf(stderr, "render: --compare: '%s' is %d x %d pixels, '%s' %d x %d\n", t->words[0], a.width, a.height, t->words[1], b.width, b.height);
+        fprintf(stderr, "render: --compare: '%s' is %d x %d pixels, '%s' %d x %d\n", t->words[0], a.width, a.height,
+                t->words[1], b.width, b.height);
         ok = 0;
     }
     if (ok) print_comparison(t, &a, &b);

@@ -130,7 +130,8 @@ static int write_layers(const tool *t, const pt_film *film)
     int ok = 1;
 
     if ((t->albedo || t->normal || t->depth) && !film->albedo) {
-        fprintf(stderr, "render: the films hold no albedo, normal and depth: render them with one of --albedo, --normal, --depth\n");
+        fprintf(stderr, "render: the films hold no albedo, normal and depth; "
+                        "render them with one of --albedo, --normal, --depth\n");
         return 0;
     }
     if (t->error_map && !pt_film_error_estimate(film, &e)) {
@@ -149,13 +150,13 @@ static int write_layers(const tool *t, const pt_film *film)
 static int write_pictures(const tool *t, const pt_film *film)
 {
     pt_film only = PT_FILM_INIT;
-    const int classes = film->class_count > 0;
-    pt_result result = classes ? pt_film_class(film, 0, &only) : PT_OK;
+    const pt_film *picture = film->class_count > 0 ? &only : film;
+    pt_result result = film->class_count > 0 ? pt_film_class(film, 0, &only) : PT_OK;
     int i, ok = 1;
 
     if (t->film) ok &= tell_written(t->film, pt_film_write(t->film, film));
     for (i = 0; i < t->output_count; i++)
-        ok &= tell_written(t->outputs[i], result != PT_OK ? result : write_picture(t, t->outputs[i], classes ? &only : film, t->exposure));
+        ok &= tell_written(t->outputs[i], result != PT_OK ? result : write_picture(t, t->outputs[i], picture, t->exposure));
     pt_film_free(&only);
     return write_layers(t, film) & ok;
 }

@@ -59,7 +59,18 @@ static void tell_warnings(const pt_obj_info *info)
     uint32_t i, shown = info->warning_count < PT_OBJ_WARNINGS ? info->warning_count : PT_OBJ_WARNINGS;
 
     for (i = 0; i < shown; i++) fprintf(stderr, "render: warning: %s\n", info->warnings[i]);
-    if (info->warning_count > shown) fprintf(stderr, "render: ... and %u more such warnings\n", (unsigned)(info->warning_count - shown));
+    if (info->warning_count > shown)
+        fprintf(stderr, "render: ... and %u more such warnings\n", (unsigned)(info->warning_count - shown));
+}
+
+/* --verbose */
+static void tell_contents(const tool *t, const pt_obj_info *info)
+{
+    fprintf(stderr, "%s: triangles %u, vertices %u, materials %u, textures %u; left out: faces without area %u, lines %u\n",
+            t->words[0], (unsigned)info->triangles, (unsigned)info->vertices, (unsigned)info->materials,
+            (unsigned)info->textures, (unsigned)info->degenerate_faces, (unsigned)info->skipped_lines);
+    fprintf(stderr, "%s: from %g,%g,%g to %g,%g,%g\n", t->words[0], (double)info->lo.x, (double)info->lo.y,
+            (double)info->lo.z, (double)info->hi.x, (double)info->hi.y, (double)info->hi.z);
 }
 
 /* The axes: up as asked for, front towards +z, or, where that is up, towards -y. 0: --up has no length. */
@@ -131,7 +142,8 @@ static int adjust_camera(const tool *t, pt_vec3 target, pt_camera *c)
 
     if (t->look_at.given) target = vec3_of(&t->look_at);
     if (t->eye.given || t->look_at.given || t->up.given) {
-        *c = pt_camera_look_at(t->eye.given ? vec3_of(&t->eye) : was.position, target, t->up.given ? vec3_of(&t->up) : was.up, (pt_real)fov);
+        *c = pt_camera_look_at(t->eye.given ? vec3_of(&t->eye) : was.position, target,
+                               t->up.given ? vec3_of(&t->up) : was.up, (pt_real)fov);
         c->lens_radius = was.lens_radius;
         c->focus_distance = was.focus_distance;
         c->near_distance = was.near_distance;
@@ -175,7 +187,8 @@ static void paint_lamp(float *rgb, int width, int height, pt_vec3 way, double ra
 
     for (y = 0; y < height; y++)
         for (x = 0; x < width; x++) {
-            const double theta = (y + 0.5) / height * PT_PI, phi = ((x + 0.5) / width - 0.5) * 2 * PT_PI; /* see pt_set_environment_image */
+            /* longitude from -z, see pt_set_environment_image */
+            const double theta = (y + 0.5) / height * PT_PI, phi = ((x + 0.5) / width - 0.5) * 2 * PT_PI;
             pt_vec3 w = pt_v3((pt_real)(sin(theta) * sin(phi)), (pt_real)cos(theta), (pt_real)(-sin(theta) * cos(phi)));
             if ((double)pt_v3_dot(w, way) < 1 - 0.25 / (2 * PT_PI)) continue;
             for (k = 0; k < 3; k++) rgb[3 * ((size_t)y * (size_t)width + (size_t)x) + (size_t)k] += (float)radiance;
@@ -260,6 +273,7 @@ static int make_model(tool *t, pt_scene *scene)
     else if (result != PT_OK) return subject_error(t, pt_result_string(result));
     if (result != PT_OK) return 0;
     tell_warnings(&info);
+    if (t->verbose) tell_contents(t, &info);
     if (!measure(t, &info, &e)) return 0;
     t->desc.camera = frame_model(t, &e);
     if (!adjust_camera(t, e.centre, &t->desc.camera)) return 0;
@@ -286,9 +300,8 @@ static void describe_subject(const tool *t, const pt_scene *scene)
     const pt_method *method = pt_method_find(t->desc.method);
 
     if (t->verbose)
-        fprintf(stderr, "%s: %u primitives, %u lights, %u without area left out; needs %s\n", t->words[0],
-                (unsigned)scene->primitive_count, (unsigned)scene->light_count, (unsigned)scene->degenerate_count,
-                pt_scene_needs_string(scene, words, sizeof words));
+        fprintf(stderr, "%s: primitives %u, lights %u; needs %s\n", t->words[0], (unsigned)scene->primitive_count,
+                (unsigned)scene->light_count, pt_scene_needs_string(scene, words, sizeof words));
     if (method && (pt_scene_needs(scene) & ~method->handles) != 0)
         fprintf(stderr, "render: warning: method %s cannot show all of %s: %s\n", method->name, t->words[0], method->summary);
 }
