@@ -1422,7 +1422,9 @@ typedef struct pt_error {
 
 /* The error estimated from the two halves, without a reference: nA nB / (nA + nB)^2 * (A-B)^2 is an unbiased
    estimate of a pixel's squared error if nA = nB, or if a half's variance falls as 1/n (Sobol points beat that,
-   so odd counts overestimate a little). It cannot see what both halves miss. 0 if unknown (one half empty). */
+   so odd counts overestimate a little). It cannot see what both halves miss. R is the picture itself: while a
+   picture is mostly noise, relmse divides by that noise, comes out too small, and may rise with the samples; rmse
+   does neither. 0 if unknown (one half empty). */
 PTDEF int pt_film_error_estimate(const pt_film *film, pt_error *out);
 /* The error against a reference picture of the same size (rows from the top, RGB). */
 PTDEF void pt_film_error(const pt_film *film, const float *reference, pt_error *out);
