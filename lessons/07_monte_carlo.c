@@ -171,7 +171,7 @@ static void picture(const char *output)
     memset(rgb, 255, sizeof rgb);
     for (int i = 0; i < 4000; i++) {
         pt_vec2 u = pt_sampler_2d(&random);
-        unsigned char *to = rgb + 3 * ((int)((1 - u.y) * (SIZE - 0.5f)) * SIZE + (int)(u.x * SIZE));
+        unsigned char *to = rgb + 3 * ((int)((1 - u.y) * (SIZE - (pt_real)0.5)) * SIZE + (int)(u.x * SIZE));
         to[1] = 60;
         to[my_darts(u) > 0 ? 0 : 2] = 0;
     }
