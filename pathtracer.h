@@ -2325,6 +2325,7 @@ PTDEF double pt_pcg32_double(pt_pcg32 *rng)
     return (double)((high << 26) | low) * PTI_2_M53;
 }
 
+#if PTI_HAS_WHITTED || PTI_HAS_MEASURED
 static pt_vec2 pti_pcg32_pair(pt_pcg32 *rng)
 {
     pt_vec2 u;
@@ -2332,6 +2333,7 @@ static pt_vec2 pti_pcg32_pair(pt_pcg32 *rng)
     u.y = pt_real_from_u32(pt_pcg32_next(rng));
     return u;
 }
+#endif
 
 PTDEF uint64_t pt_hash64(uint64_t x)
 {
