@@ -32,11 +32,12 @@ SHARES = $(shell k=1; while [ $$k -le $(JOBS) ]; do echo $$k; k=$$((k + 1)); don
 TESTS = $(patsubst tests/%.c,%,$(wildcard tests/test_*.c))
 # Those that take longest begin first, so that none is left alone at the end; scripts look at no numbers.
 LONGEST = $(filter test_transport test_driver test_radiometry test_oracles,$(TESTS))
-SCRIPTS = $(if $(SEED),,switches docs sections lessons)
+SCRIPTS = $(if $(SEED),,switches tool docs sections lessons)
 STARTED = $(LONGEST:%=build/test/%.log) $(SCRIPTS:%=build/test/check_%.log) $(TESTS:%=build/test/%.log)
 TEST_LOGS = $(SCRIPTS:%=build/test/check_%.log) $(TESTS:%=build/test/%.log)
 LESSONS = $(patsubst lessons/%.c,%,$(sort $(wildcard lessons/[0-9][0-9]_*.c)))
-EXAMPLES = minimal render scenes own_threads two_files cpp_user
+EXAMPLES = minimal render scenes own_threads two_files cpp_user mpi_render
+MPICC = mpicc
 # Samples per pixel of the contact sheet.
 SHEET_SPP = 128
 
@@ -83,7 +84,7 @@ build/flags: FORCE
 
 FORCE:
 
-build/render: examples/render.c pathtracer.h build/flags
+build/render: examples/render.c $(wildcard examples/render/*.h) pathtracer.h build/flags
 	$(BUILD_C) examples/render.c -o $@ $(LDLIBS)
 
 # ---- examples ------------------------------------------------------------------------------------
@@ -94,9 +95,10 @@ examples: $(EXAMPLES:%=build/examples/%)
 	    case $$e in \
 	    render) set -- ./render cornell-spheres --size 64x64 --spp 16 --progress off -o render.png ;; \
 	    scenes) set -- ./scenes 1 ;; \
+	    mpi_render) set -- ./mpi_render cornell 4 ;; \
 	    *) set -- ./$$e ;; \
 	    esac; \
-	    if [ -s $$e ]; then "$$@" || exit 1; else echo 'skipped: no C++ compiler'; fi; \
+	    if [ -s $$e ]; then "$$@" || exit 1; else echo 'skipped: its compiler is not installed'; fi; \
 	done
 
 build/examples/minimal: examples/minimal.c pathtracer.h build/flags
@@ -128,6 +130,15 @@ build/examples/cpp_user: examples/cpp_user.cpp pathtracer.h build/flags
 	@if command -v $(firstword $(CXX)) > /dev/null 2>&1; then \
 	    echo '$(BUILD_CXX) examples/cpp_user.cpp -o $@ $(LDLIBS)'; \
 	    $(BUILD_CXX) examples/cpp_user.cpp -o $@ $(LDLIBS); \
+	else : > $@; fi
+
+# The same where there is no MPI; one rank is run, which needs no mpirun.
+build/examples/mpi_render: examples/mpi_render.c pathtracer.h build/flags
+	@mkdir -p build/examples
+	@if command -v $(MPICC) > /dev/null 2>&1; then \
+	    set -- $(FIXED) $(WARN_C) $(CFLAGS) $(EXTRA) -I. -pthread $(LDFLAGS) examples/mpi_render.c -o $@ $(LDLIBS); \
+	    echo "$(MPICC) $$*"; \
+	    OMPI_CC='$(CC)' MPICH_CC='$(CC)' $(MPICC) "$$@"; \
 	else : > $@; fi
 
 # ---- lessons -------------------------------------------------------------------------------------
@@ -192,9 +203,10 @@ build/test/test_stress: tests/stress.c
 build/test/test_%.log: build/test/test_% FORCE
 	@sh tests/run.sh one $@ ./$<
 
+build/test/check_tool.log: build/render
 build/test/check_%.log: tests/check_%.sh pathtracer.h FORCE
 	@mkdir -p build/test
-	@CC='$(CC)' CFLAGS='$(CFLAGS)' EXTRA='$(EXTRA)' sh tests/run.sh one $@ sh $<
+	@RENDER=build/render CC='$(CC)' CFLAGS='$(CFLAGS)' EXTRA='$(EXTRA)' sh tests/run.sh one $@ sh $<
 
 # ---- measuring, and testing the tests ------------------------------------------------------------
 

@@ -1,4 +1,4 @@
-/* pathtracer.h - v0.2.0 - a path tracer in one C99 header: render by the rendering equation,
+/* pathtracer.h - v0.3.0 - a path tracer in one C99 header: render by the rendering equation,
    know how wrong the picture still is, and how long that took.      MIT-0 or public domain, see the end.
 
    Do this in exactly ONE C or C++ file, and include the header plainly everywhere else:
@@ -186,9 +186,9 @@
    ===================================================================================================== */
 
 #define PT_VERSION_MAJOR 0
-#define PT_VERSION_MINOR 2
+#define PT_VERSION_MINOR 3
 #define PT_VERSION_PATCH 0
-#define PT_VERSION_STRING "0.2.0"
+#define PT_VERSION_STRING "0.3.0"
 
 #if (defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ > 0) || \
      defined(__ASSOCIATIVE_MATH__) || defined(__RECIPROCAL_MATH__) || defined(_M_FP_FAST)) && \
@@ -1422,7 +1422,9 @@ typedef struct pt_error {
 
 /* The error estimated from the two halves, without a reference: nA nB / (nA + nB)^2 * (A-B)^2 is an unbiased
    estimate of a pixel's squared error if nA = nB, or if a half's variance falls as 1/n (Sobol points beat that,
-   so odd counts overestimate a little). It cannot see what both halves miss. 0 if unknown (one half empty). */
+   so odd counts overestimate a little). It cannot see what both halves miss. R is the picture itself: while a
+   picture is mostly noise, relmse divides by that noise, comes out too small, and may rise with the samples; rmse
+   does neither. 0 if unknown (one half empty). */
 PTDEF int pt_film_error_estimate(const pt_film *film, pt_error *out);
 /* The error against a reference picture of the same size (rows from the top, RGB). */
 PTDEF void pt_film_error(const pt_film *film, const float *reference, pt_error *out);
@@ -2323,6 +2325,7 @@ PTDEF double pt_pcg32_double(pt_pcg32 *rng)
     return (double)((high << 26) | low) * PTI_2_M53;
 }
 
+#if PTI_HAS_WHITTED || PTI_HAS_MEASURED
 static pt_vec2 pti_pcg32_pair(pt_pcg32 *rng)
 {
     pt_vec2 u;
@@ -2330,6 +2333,7 @@ static pt_vec2 pti_pcg32_pair(pt_pcg32 *rng)
     u.y = pt_real_from_u32(pt_pcg32_next(rng));
     return u;
 }
+#endif
 
 PTDEF uint64_t pt_hash64(uint64_t x)
 {
@@ -11624,6 +11628,9 @@ PTDEF const pt_scene_entry *pt_scene_find(const char *name)
 /*
    VERSION HISTORY
 
+   0.3.0 (2026-11-22)  models (pt_load_obj: OBJ with MTL and textures), PNG and all PPM read, film files with a checksum
+                       (pt_film_write, pt_film_read), PPM of four kinds, files synced before they are renamed; rays keep
+                       the digits that float loses, so that nothing leaks far from the origin; x87 is refused.
    0.2.0 (2026-11-22)  what the lecture names up to importance sampling: GGX metal and glass, measured eta and k,
                        Phong, Blinn-Phong, Oren-Nayar, coat, MERL tables and a virtual gonioreflectometer, textures;
                        spot, parallel and image environment light; pixel filters; local, Whitted, distribution and

@@ -2,19 +2,24 @@
 
    QUESTION   How does a list of shapes become a picture?
 
-   IDEA       One ray for each pixel, backwards, from the eye into the scene. It asks each shape where it is
-              met, and the nearest meeting in front of the eye decides what the pixel shows.
+   IDEA       One ray for each pixel, backwards, from the eye of a camera into the scene. It asks each shape for an
+              intersection, and the nearest one in front of the eye decides what the pixel shows. With h the
+              vertical field of view and a the width of the picture over its height:
 
                   ray         o + t d,  d = forward + x a tan(h/2) right + y tan(h/2) up,  x, y in [-1, 1]
-                  sphere      |o + t d - c|^2 = r^2,  t = -b - sqrt(b^2 - q),  b = d.(o-c),  q = |o-c|^2 - r^2
-                  triangle    o + t d = v0 + u e1 + v e2  with u, v >= 0, u + v <= 1: Cramer's rule
+                  sphere      |o + t d - c|^2 = r^2, c its centre.  If |d| = 1:  t = -b - sqrt(b^2 - q),
+                              b = d.(o-c),  q = |o-c|^2 - r^2
+                  triangle    o + t d = v0 + u e1 + v e2  with u, v >= 0, u + v <= 1 (v0 a corner): Cramer's rule
 
-              Row 0 of a picture is its top, so y falls while the row rises. Light is computed in linear
-              numbers; a file holds sRGB codes, a curve close to a power of 1/2.2: half the light has code
-              188, not 128. How much of the picture does a shape cover? In the plane at distance 1 a ball on
-              the axis, at distance d, is a circle of radius r / sqrt(d^2 - r^2), a triangle parallel to the
-              picture at distance z is itself divided by z, and the picture has the area 4 a tan^2(h/2). So
-              the shares are known exactly, and counting random rays must give them.
+              Row 0 of a picture is its top, so y falls while the row rises. Light is computed in linear numbers; a
+              file holds sRGB codes, a curve close to a power of 1/2.2 (gamma correction): half the light has code
+              188, not 128. How much of the picture does a shape cover? The image plane at distance 1 shows the area
+              4 a tan^2(h/2). A ball of radius r at distance s, on the axis, is a circle of radius r / sqrt(s^2 - r^2)
+              there; a triangle parallel to the plane at distance z is 1/z as wide and as high, so its area is divided
+              by z^2. Here h = 40 degrees, a = 320/240, r = 1, s = z = 5, the triangle 1 wide and 2.25 high: of 0.7065
+              they cover pi/24 and 0.045, shares of 0.1853 and 0.06369, and counting random rays must give them.
+
+   PICTURE    Triangle and ball, coloured by their normals: red, green and blue are x, y and z, -1 dark and 1 bright.
 
    BUILD      cc -O2 -I.. 01_first_image.c -o 01_first_image -lm -pthread
    RUN        ./01_first_image [samples] [output]
@@ -153,7 +158,7 @@ static void table(const char *name, int shape, int mine, double exact, double mo
     check(fabs(s.mean - exact) <= 5 * pt_stats_standard_error(&s), "within 5 standard errors of the exact share");
 }
 
-/* One ray through the middle of each pixel. The colour shows the normal: (n + 1) / 2. */
+/* One ray through the middle of each pixel. The colour is that of the normal: (n + 1) / 2. */
 static void picture(const char *output)
 {
     static unsigned char rgb[WIDTH * HEIGHT * 3];

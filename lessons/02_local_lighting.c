@@ -2,23 +2,26 @@
 
    QUESTION   How bright is a point that sees a lamp, and what does that answer leave out?
 
-   IDEA       The oldest model of light in pictures asks only the point itself, the lamp and the eye:
+   IDEA       The oldest model of light in pictures asks only the point itself, the lamp (a point light) and the eye:
 
                   L = La + Ld + Ls = ka Ia + kd (I/r^2) max(0, n.l) + ks (I/r^2) max(0, n.h)^p
 
-              n is the normal, l points to the lamp at distance r, v to the eye, and h = (l + v) / |l + v| lies half
-              way between (Blinn 1977; Phong 1975 had max(0, m.v)^p with the mirror image m of l). The middle term
-              is physics: a lamp of intensity I gives the irradiance E = I n.l / r^2, and a grey surface then has
-              the radiance f E with f = albedo / pi. So kd is albedo / pi and never above 1/pi; with kd = albedo, as
-              it is often used, L is pi times too bright. The last term is a guess that looks good, the first a
-              confession: the light that comes from everywhere else is not known. With the eye at the lamp, h = l,
-              and the mean over a disk of radius R right below the lamp, at distance H, is known: dA n.l / r^2 is
-              the solid angle dw, so with cos a = H / sqrt(R^2 + H^2)
+              Ia is the ambient light, ka, kd, ks are what the surface sends on of each; n is the normal, l points to
+              the lamp at distance r, v to the eye, and the half vector h = (l + v) / |l + v| lies half way between
+              (Blinn 1977; Phong 1975 had max(0, m.v)^p with the mirror image m of l). The diffuse term is physics: a
+              lamp of intensity I gives the irradiance E = I n.l / r^2 (inverse-square falloff), and a grey surface
+              that reflects the share `albedo` of it has the radiance f E with f = albedo / pi. So kd is albedo / pi
+              and never above 1/pi; with kd = albedo, as it is often used, L is pi times too bright. The specular term
+              is a guess that looks good, the first a confession: the light that comes from everywhere else is not
+              known. With the eye at the lamp, h = l, and the mean over a disk of radius R right below the lamp, at
+              distance H, is known: dA n.l / r^2 is the solid angle dw, so with cos a = H / sqrt(R^2 + H^2)
 
                   mean Ld = 2 kd I (1 - cos a) / R^2,   mean Ls = 2 ks I (1 - cos^p a) / (p R^2)
 
-              No ray is traced to the lamp: nothing can be in between. Nothing is mirrored, and no light comes from
-              the neighbours.
+              No ray is traced to the lamp: nothing casts a shadow. Nothing is mirrored, and no light comes from the
+              neighbours: that would be global illumination. This is local lighting.
+
+   PICTURE    Left local lighting, right path tracing: a red ball above the floor, a mirror ball on it, one lamp above.
 
    BUILD      cc -O2 -I.. 02_local_lighting.c -o 02_local_lighting -lm -pthread
    RUN        ./02_local_lighting [samples] [output]
@@ -149,9 +152,7 @@ static void picture(const char *output)
     pt_render_desc desc = pt_render_defaults();
     char path[1024];
     desc.camera = pt_camera_look_at(pt_v3(0, 3, 7), pt_v3(0.25, 0.625, 0), pt_v3(0, 1, 0), 36);
-    desc.width = WIDTH / 2;
-    desc.height = HEIGHT;
-    desc.spp = 32;
+    desc.width = WIDTH / 2, desc.height = HEIGHT, desc.spp = 32;
     desc.li.ambient = pt_rgb_grey((pt_real)(kaIa / kd));
     for (int k = 0; k < 2; k++) {
         pt_film film = PT_FILM_INIT;
@@ -161,9 +162,8 @@ static void picture(const char *output)
             int x = i % (WIDTH / 2), y = i / (WIDTH / 2);
             pt_rgbd v = pt_film_pixel(&film, x, y);
             unsigned char *to = rgb + 3 * (y * WIDTH + x + k * WIDTH / 2);
-            to[0] = pt_srgb_byte(v.r * (k ? 2 : 2 / PT_PI));
-            to[1] = pt_srgb_byte(v.g * (k ? 2 : 2 / PT_PI));
-            to[2] = pt_srgb_byte(v.b * (k ? 2 : 2 / PT_PI));
+            double band[3] = {v.r, v.g, v.b};
+            for (int c = 0; c < 3; c++) to[c] = pt_srgb_byte(band[c] * (k ? 2 : 2 / PT_PI));
         }
         pt_film_free(&film);
     }

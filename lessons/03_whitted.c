@@ -2,20 +2,22 @@
 
    QUESTION   What do mirrors, glass and shadows cost, and where exactly does the next ray start?
 
-   IDEA       Each ray that meets a surface asks further rays (Whitted 1980):
+   IDEA       Each ray that meets a surface asks further rays (Whitted 1980), a multiple recursion:
 
-                  diffuse    a shadow ray to the lamp:     L = albedo / pi  I n.l / r^2   or 0
-                  mirror     one ray:                      L = albedo L(reflected)
-                  glass      two rays:                     L = R L(reflected) + (1 - R) L(refracted)
+                  diffuse    a shadow ray to the lamp:     L = albedo / pi  I n.l / r^2   (lesson 02) or 0
+                  mirror     one ray, the reflection:      L = albedo L(reflected)
+                  glass      also one of refraction:       L = R L(reflected) + (1 - R) L(refracted)
 
-              with R from Fresnel's formulas (lesson 20): a tree. Straight through a glass ball R = ((n-1)/(n+1))^2 =
-              0.04 on each side; with what goes to and fro within, (1-R)/(1+R) = 0.923 passes: a geometric series,
-              which the tree sums. A lamp that is a point throws sharp shadows: that of a ball of radius r at distance
-              d below it, on a floor at distance H below it, is a circle of area pi H^2 r^2 / (d^2 - r^2).
-              The next ray starts where this one ended, at a rounded point a little inside or outside the surface;
-              from inside it meets its own surface at once: acne. A fixed step away is too small in a large scene and
-              too large in a small one; the header's step is a bound of that point's own rounding error. What the tree
-              never finds: light through glass (its shadow is black), soft shadows, light between diffuse walls.
+              R is the Fresnel term (lesson 20). Straight through a ball of refractive index eta = 1.5 it is
+              ((eta-1)/(eta+1))^2 = 0.04 on each side, and with what goes to and fro within, (1-R)/(1+R) = 0.923
+              passes: a series, which this tree of rays sums. A point as lamp casts a hard shadow: a ball of radius s
+              at distance d below it, on a floor at distance H, one of area pi H^2 s^2 / (d^2 - s^2); here s = 1/2, d =
+              2, H = 3, counted in a square of side 2. The next ray starts where this one ended, by a rounding error
+              inside or outside the surface; from inside it meets its own surface at once: acne. A fixed step away is
+              too small in a large scene, too large in a small one; the header's step is a bound of that error. Ray
+              tracing of this kind never finds light through glass, soft shadows, and light between diffuse walls.
+
+   PICTURE    My picture. The shadow of the clear ball of glass is as black as that of the mirror behind it.
 
    BUILD      cc -O2 -I.. 03_whitted.c -o 03_whitted -lm -pthread
    RUN        ./03_whitted [samples] [output]
@@ -199,8 +201,7 @@ int main(int argc, char **argv)
     }
     printf("What to see: a fixed step is right at one size; the header's, a bound of the rounding error, at all.\n");
     axis.o = at(0, 1, 3), axis.d = at(0, 0, -1), axis.tmax = endless;
-    mine = whitted(axis, 1) / (double)sky;
-    its = whitted(axis, 0) / (double)sky;
+    mine = whitted(axis, 1) / (double)sky, its = whitted(axis, 0) / (double)sky;
     printf("straight through the glass ball: mine %.5f, header %.5f, exact %.5f\n", mine, its, through);
     check(fabs(mine - through) < 1e-5 && fabs(its - through) < 1e-5, "the tree sums the series");
     picture(argc > 2 ? argv[2] : "03_whitted");
@@ -216,5 +217,4 @@ int main(int argc, char **argv)
    (2) Break: start rays where they ended (-DEX=2) and look at the picture. Then let the shadow ray go on beyond the
        lamp (-DEX=3). Which checks fail? Answer: (2) my share at size 1, the way through the ball, and the picture,
        full of dots; (3) the share, which is 1, and the picture: the ceiling darkens all of the floor.
-   (3) Extend: a second lamp like the first, at (1, 3, 0). Which share of the square is still quite dark?
-       Answer: 0.274, where the two shadows overlap. */
+   (3) Extend: a second lamp like the first, at (1, 3, 0). Which share of the square gets no light? Answer: 0.274. */

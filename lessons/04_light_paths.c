@@ -2,24 +2,26 @@
 
    QUESTION   Which light does a method find, and which light can it never find?
 
-   IDEA       Write down what happened to the light on its way: L lamp, D diffuse reflection, S mirror or glass, V
-              volume, E eye. A kind of light is then a set of words, and a regular expression names it: (S|D)* is any
-              number of surfaces, S+ one or more, D? one or none. The slides' rows, with what they leave out:
+   IDEA       Light path notation tells what happened to light on its way: L lamp, D diffuse reflection, S mirror or
+              glass, V volumetric scattering, E eye. Regular expressions name sets of such words: (S|D)* is any number
+              of surfaces, S+ one or more, D? one or none. The slides' rows, and LE, which they leave out:
 
-                  LE               the lamp itself                 (not on the slides)
-                  L(D|S)E          direct light                    local lighting, lesson 02: its D
+                  LE               the lamp itself
+                  L(D|S)E          direct lighting                 local lighting, lesson 02: its D
                   L(S|D)S+E        seen in mirrors                 classical ray tracing
                   LS+DE            caustics
                   L(S|D)*DDE       colour bleeding
                   L(S|D)+DS+E      caustics and bleeding in mirrors
-                  L(S|D)+D(S|D)*E  "others"
+                  L(S|D)+D(S|D)*E  "others"                        all but the first two: indirect lighting
 
-              The last row of the slides overlaps with three rows above it: of the 2^k words with k surfaces it has
-              all that have a D after the first letter, 2^k - 2, but only 2^(k-2) - 1 of them are in no row above.
-              Read as "the first row that matches" they are a partition, and the light of all adds up to the whole.
-              Whitted finds LD?S*E, 2 words of 2^k. In a white sphere of radius 1, albedo rho, around a point lamp of
-              flux Phi, every wall point has the same light from k > 1 diffuse reflections, wherever the lamp is: LDDE
-              is rho^2 Phi / (4 pi^2), each D more multiplies it by rho, so LDD+E has rho^2 Phi / (4 pi^2 (1 - rho)).
+              The last row overlaps with three rows above it: of the 2^k words with k surfaces it has all that have a D
+              after the first letter, 2^k - 2, but only 2^(k-2) - 1 of them are in no row above. Read as "the first row
+              that matches" they are a partition, whose light adds up to all light transport. Whitted finds LD?S*E, 2
+              words of 2^k. In a white sphere of radius 1, albedo rho, around a point lamp of flux Phi every wall point
+              has the same light from k > 1 diffuse reflections, wherever the lamp is: LDDE is rho^2 Phi / (4 pi^2),
+              each D more multiplies it by rho, and LDD+E has rho^2 Phi / (4 pi^2 (1 - rho)). Here rho = 1/2, Phi = 1.
+
+   PICTURE    A box with a mirror and a glass ball: above direct, in mirrors, caustics, below the last three rows.
 
    BUILD      cc -O2 -I.. 04_light_paths.c -o 04_light_paths -lm -pthread
    RUN        ./04_light_paths [samples] [output]
@@ -165,9 +167,8 @@ static void picture(const pt_lpe *slides, const char *output)
     pt_film film = PT_FILM_INIT, part = PT_FILM_INIT;
     double light[ROWS] = {0}, sum = 0, whole = 0;
     char path[1024];
-    desc.width = desc.height = SIZE;
+    desc.width = desc.height = SIZE, desc.li.lpe = slides;
     desc.spp = getenv("SHORT") ? 4 : 32;
-    desc.li.lpe = slides;
     check(pt_scene_cornell_spheres(&scene, &desc.camera) == PT_OK && pt_render(&scene, &desc, &film, NULL) == PT_OK,
           "the box is rendered, one picture for each row");
     for (int i = 0; i < SIZE * SIZE; i++) whole += pt_film_pixel(&film, i % SIZE, i / SIZE).g;
@@ -216,5 +217,4 @@ int main(int argc, char **argv)
        LDDE alone, half of it: 0.006333 instead of 0.01267, for rho = 1/2.
    (2) Break: take the slides' last row as it stands (-DEX=2): the rows have more words than there are. Or write the
        caustics from the eye to the lamp, LDS+E (-DEX=3): the row is empty, for those are diffuse things in mirrors.
-   (3) Extend: to which row belongs LSDDSE, and which method of lessons 02 to 05 draws it? Answer: in mirrors,
-       L(S|D)+DS+E; none does. */
+   (3) Extend: to which row belongs LSDDSE, and which method of lessons 02 to 05 draws it? Answer: in mirrors; none. */

@@ -2,21 +2,24 @@
 
    QUESTION   What makes edges smooth, shadows soft, backgrounds blurred, metal rough, and how many rays is that?
 
-   IDEA       Each of these is a mean: over the area of a pixel, of a lens, of a lamp, over the lobe of directions
-              around the mirrored one that a rough surface reflects. A mean is estimated by asking at random places
-              (Cook, Porter, Carpenter 1984):
+   IDEA       Smooth edges (anti-aliasing), soft shadows with a penumbra, depth of field, glossy metal: each is a mean,
+              over the area of a pixel, of an area light, of a lens, over the lobe of directions around the mirrored
+              one that a rough surface reflects. A mean is estimated by asking at random places [Coo84]:
 
                   pixel   a point of the square              share of x + 2 y < 1:    1/4
                   lens    a point of the disk of radius R    share that sees x > s at depth z, focus at f:
                                                              (acos c - c sqrt(1 - c^2)) / pi,  c = s / (R |1 - z/f|)
-                  light   a point of the lamp                E = A mean of V cos cos' / r^2: Lambert's formula
+                  light   a point of the lamp of area A      E = A mean of V cos cos' / r^2: Lambert's formula
                   gloss   a direction, density (m+1)/(2 pi) cos^m   a round lamp of half angle a: 1 - cos^(m+1) a
 
-              The point of it: the means are not nested. One ray takes numbers for all of its decisions at once. Four
-              means with 4 rays each, one inside the other, are 256 rays whose pixel was asked at 4 places only; 256
-              rays that decide all at once ask the pixel at 256 places, and the lens, and the lamp. Each decision
-              needs numbers of its own: a ray that uses one number twice sees only combinations that belong together
-              by chance. Light from one diffuse surface to the next is still missing: the words L(D|G|S)?(G|S)*E.
+              Here R = 1/2, s = 1/16, z = 2, f = 4, m = 19, sin a = 1/3; the lamp, 1 x 1 at height 2, is half hidden: V
+              is 1 where it is seen, else 0. The means are not nested. One ray takes numbers for all of its decisions
+              at once. Four means with 4 rays each, one inside the other, are 256 rays whose pixel was asked at 4
+              places only; 256 samples per pixel that decide all at once ask pixel, lens and lamp at 256 places each.
+              Each decision needs numbers of its own: one number used twice ties together what has nothing to do with
+              each other. Light between diffuse surfaces is still missing; found is L(D|G|S)?(G|S)*E, G for glossy.
+
+   PICTURE    By the header's distribution ray tracing, 32 rays a pixel: the balls are in focus, the distance is not.
 
    BUILD      cc -O2 -I.. 05_distribution.c -o 05_distribution -lm -pthread
    RUN        ./05_distribution [samples] [output]

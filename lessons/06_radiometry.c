@@ -2,17 +2,20 @@
 
    QUESTION   A bulb says 815 lumens. How bright is the table below it, and what does an eye see of the table?
 
-   IDEA       Light is power, and the four quantities differ in what it is divided by:
+   IDEA       Light is power, and radiometry has four quantities for it that differ in what it is divided by:
 
-                  flux        Phi                          W  (lm)           all of it
-                  intensity   I = dPhi / dw                W/sr  (cd)        in a direction, of a small source
-                  irradiance  E = dPhi / dA                W/m^2  (lx)       on a surface
-                  radiance    L = d^2Phi / (dw dA cos t)   W/(sr m^2)        along a ray: what is seen
+                  radiant flux        Phi                          W  (lm)           all of it
+                  radiant intensity   I = dPhi / dw                W/sr  (cd)        in a direction, of a small source
+                  irradiance          E = dPhi / dA                W/m^2  (lx)       on a surface
+                  radiance            L = d^2Phi / (dw dA cos t)   W/(sr m^2)        along a ray: what is seen
 
-              A solid angle is area over squared distance on a sphere, dw = sin t dt dphi, 4 pi sr in all. So a bulb
-              that shines evenly has I = 815 lm / (4 pi) = 64.86 cd, and at 2 m, straight below, E = I cos t / d^2 =
-              16.21 lx. The cosine (Lambert) makes summer and winter: the same beam covers a larger piece of ground.
-              Irradiance is what radiance brings from all directions, intensity what a surface sends out:
+              In brackets are the units of light as an eye weighs it: luminous flux in lumen, intensity in candela,
+              illuminance in lux. A watt gives about 90 lm in an LED, 12 in an incandescent lamp. A solid angle is area
+              over squared distance on a sphere, dw = sin t dt dphi, 4 pi steradian (sr) in all. So a bulb that shines
+              evenly has I = 815 lm / (4 pi) = 64.86 cd, and at 2 m, straight below, E = I cos t / d^2 = 16.21 lx, by
+              the inverse-square falloff and Lambert's cosine law. The cosine makes summer and winter: the same beam
+              covers a larger piece of ground. Irradiance is what radiance brings from all directions of the
+              hemisphere, intensity what a surface sends out:
 
                   E = integral of L cos t dw,  pi L below an even sky
                   I = integral of L cos t dA over the lamp
@@ -20,7 +23,10 @@
               Two corrections to the slides. E is power per area of the surface dA, as they say first, not per
               projected area: the projection is in L, which is why L cos t dw stands in the integral. And the L in the
               integral for I is what leaves the lamp, L_o, not the L_i that arrives. 1/d^2 holds for points. A disk of
-              radius R has E = pi L R^2 / (R^2 + d^2): 1/d^2 within 1 % from d = 10 R.
+              radius R has E = pi L R^2 / (R^2 + d^2): 1/d^2 within 1 % from d = 10 R. The rows "cone" are for a half
+              angle of 10 degrees.
+
+   PICTURE    The table of 8 m x 6 m from above; it is darker where E is 1, 2, 4, 8 lx (rings) and 16 lx (the middle).
 
    BUILD      cc -O2 -I.. 06_radiometry.c -o 06_radiometry -lm -pthread
    RUN        ./06_radiometry [samples] [output]

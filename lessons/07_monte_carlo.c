@@ -2,21 +2,25 @@
 
    QUESTION   How does a mean of random numbers become an integral, and how does it know its own error?
 
-   IDEA       A density p(x) >= 0 with integral 1 says how often X is near x. The expectation of g(X) is the integral
-              of g p, and so, if p > 0 wherever f is not 0,
+   IDEA       A probability density p(x) >= 0 with integral 1 says how often X is near x. The expected value of g(X) is
+              the integral of g p. So for X_i drawn independently, with p > 0 wherever f is not 0,
 
                   F_N = (1/N) sum of f(X_i) / p(X_i),   E[F_N] = integral of f(x)/p(x) p(x) dx = integral of f
 
-              whatever N is: the estimator is unbiased. For X uniform in [a, b] it is (b - a) times the mean of f. The
-              variance s^2 = E[(f/p)^2] - (integral of f)^2 of one value tells the error of the mean of N, its
-              standard error s / sqrt(N), and s is estimated from the same values. So four times the samples, and four
-              times the seconds, for half the error: slope -1/2 on log-log axes, in any number of dimensions. Here
-              f(x) = 4 sqrt(1 - x^2) on [0, 1], whose integral is pi, in three ways:
+              whatever N is: the estimator is unbiased. (One that is biased, but less and less as N grows, is
+              consistent.) For X uniform in [a, b] it is (b - a) times the mean of f. One value f/p has the variance
+              s^2 = E[(f/p)^2] - (integral of f)^2 and the standard deviation s, a mean of N the root mean square error
+              s / sqrt(N), its standard error; s^2 is estimated from the same values, as N/(N-1) (mean of squares -
+              square of mean). This convergence is slow: four times the samples, and seconds, for half the error, slope
+              -1/2 on log-log axes, but in any number of dimensions. Here f(x) = 4 sqrt(1 - x^2) on [0, 1], with the
+              integral pi, by u, v uniform in [0, 1); the last p is large where f is:
 
-                  darts     4 if x^2 + y^2 < 1, else 0           s^2 = pi (4 - pi)            = 2.697
-                  uniform   p = 1                                s^2 = 32/3 - pi^2            = 0.7971
-                  falling   p = (4 - 2 x) / 3, x = 2 - sqrt(4 - 3 u)
-                            (the density is large where f is)    s^2 = 60 - 72 log 2 - pi^2   = 0.2238
+                  darts     p = 1 on a square: 4 if u^2 + v^2 < 1, else 0    s^2 = pi (4 - pi)           = 2.697
+                  uniform   p = 1, x = u                                     s^2 = 32/3 - pi^2           = 0.7971
+                  falling   p = (4 - 2 x) / 3, x = 2 - sqrt(4 - 3 u)         s^2 = 60 - 72 ln 2 - pi^2   = 0.2238
+
+   PICTURE    4000 darts, blue where they hit the quarter of a circle.
+   PLOT       Upwards the root mean square error of 256 runs, divided by pi: the square root of relMSE.
 
    BUILD      cc -O2 -I.. 07_monte_carlo.c -o 07_monte_carlo -lm -pthread
    RUN        ./07_monte_carlo [samples] [output]
@@ -149,8 +153,7 @@ static double curve(double (*value)(pt_vec2), pt_report *report, pt_report_row *
         rows[k].has_true_error = 1;
         rows[k].true_error.relmse = squares;
     }
-    report->rows = rows;
-    report->row_count = ROWS;
+    report->rows = rows, report->row_count = ROWS;
     return 0.5 * log2(rows[ROWS - 1].true_error.relmse / rows[0].true_error.relmse) / (ROWS - 1);
 }
 
@@ -168,7 +171,7 @@ static void picture(const char *output)
     memset(rgb, 255, sizeof rgb);
     for (int i = 0; i < 4000; i++) {
         pt_vec2 u = pt_sampler_2d(&random);
-        unsigned char *to = rgb + 3 * ((int)((1 - u.y) * (SIZE - 0.5f)) * SIZE + (int)(u.x * SIZE));
+        unsigned char *to = rgb + 3 * ((int)((1 - u.y) * (SIZE - (pt_real)0.5)) * SIZE + (int)(u.x * SIZE));
         to[1] = 60;
         to[my_darts(u) > 0 ? 0 : 2] = 0;
     }
@@ -194,7 +197,7 @@ int main(int argc, char **argv)
     table("my uniform", my_uniform, 32 / 3.0 - PT_PI * PT_PI, most);
     table("my falling", my_falling, 60 - 72 * log(2) - PT_PI * PT_PI, most);
     header_table("pt uniform", its_uniform, most);
-    printf("What to see: for one error darts need 12 times the samples of the density that falls with f.\n");
+    printf("What to see: for one error darts take 12 times the samples, 8 times the seconds of the falling density.\n");
     if (EX == 1) {
         mean = my_estimate(my_darts, 2732, &random, &error);
         printf("2732 darts: %.4g, error %.2g %%\n", mean, 100 * error / PT_PI);
@@ -210,9 +213,8 @@ int main(int argc, char **argv)
 /* EXERCISES
    (1) Predict: how many darts until the standard error is 1 % of pi? (-DEX=1 throws that many.) Answer: pi (4 - pi) /
        (0.01 pi)^2 = 2732.
-   (2) Break: forget to divide by p (-DEX=2): the mean is some other number, with a small error bar, and its line in
-       the plot goes flat. Then report the deviation of one value as the error of the mean (-DEX=3): all runs are
+   (2) Break: forget to divide by p (-DEX=2): the mean is the integral of f p, 3.29990, with a small error bar; its line
+       in the plot goes flat. Then report the deviation of one value as the error of the mean (-DEX=3): all runs are
        within it. An error bar that is always right is wrong.
-   (3) Extend: antithetic samples, the mean of f(u) and f(1 - u) (pt_estimate_antithetic). Which variance does one
-       such mean have? Answer: 0.1097, and half of 0.7971 would be two values that know nothing of each other: 3.6
-       times better. */
+   (3) Extend: antithetic samples, the mean of f(u) and f(1 - u) (pt_estimate_antithetic). Which variance has one
+       such mean? Answer: 0.1097, 3.6 times less than half of 0.7971, that of two values independent of each other. */

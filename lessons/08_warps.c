@@ -3,21 +3,26 @@
    QUESTION   The computer has uniform numbers. How do they become directions with a wanted density, and who notices
               if the density is another one?
 
-   IDEA       Inversion: if P(x) is the integral of p up to x, then x = P^-1(u) has density p for uniform u. For
+   IDEA       A warp turns numbers u, v that are uniform in [0, 1) into directions. Inversion: if P(x) is the
+              cumulative distribution, the integral of p up to x, then x = P^-1(u) has the probability density p. For
               directions around a normal, with density proportional to cos^n,
 
                   p(w) = (n+1)/(2 pi) cos^n t per solid angle,   cos t = (1 - u)^(1/(n+1)),   phi = 2 pi v
 
-              n = 0 is the uniform hemisphere, n = 1 is Lambert's cosine. For the disk the same gives r = sqrt(u), not
-              r = u: a ring at radius r has a circumference that grows with r. Rejection: draw in the square until the
-              point is in the disk; pi/4 of the draws stay. The famous mistake: "normal + random point in the unit
-              ball" looks like a diffuse surface, and is not. The points on the ray at angle t fill it up to length 2
-              cos t, so their density is proportional to the integral of r^2 up to there: p = (2/pi) cos^3 t, too dark
-              at the rim. With a random point ON the sphere it is right: that is cos t / pi exactly. Means tell some
-              mistakes: E[cos t] = (n+1)/(n+2), that is 1/2, 2/3, and 4/5 for the mistake. All of them are told by
-              counting directions in cells of equal probability: the sum of (observed - expected)^2 / expected is
-              distributed like chi-squared with cells - 1 degrees of freedom, and p, the chance of a sum at least as
-              large, is uniform if the density is right and 0 if it is wrong.
+              n = 0 is the uniform hemisphere, n = 1 is Lambert's cosine law. For the disk the same gives r = sqrt(u),
+              not r = u: a ring at radius r has a circumference that grows with r. Rejection sampling: draw in the
+              square until the point is in the disk; pi/4 of the draws stay. The famous mistake: "normal + random point
+              in the unit ball" looks like a diffuse surface, and is not. The points on the ray at angle t fill it up
+              to length 2 cos t, so their density is proportional to the integral of r^2 up to there: p = (2/pi) cos^3
+              t, and light that comes in flat counts too little. With a random point ON the sphere it is right: that is
+              cos t / pi exactly.
+
+              Means tell some mistakes: E[cos t] = (n+1)/(n+2), that is 1/2, 2/3, and 4/5 for the mistake. All of them
+              are told by a chi-squared test: count directions in cells of equal probability; the sum of (observed -
+              expected)^2 / expected is distributed like chi-squared with cells - 1 degrees of freedom, and the
+              p-value, the chance of a sum at least as large, is uniform if the density is right and 0 if it is wrong.
+
+   PICTURE    2500 points each, from above: uniform directions and cosine (blue); the famous mistake and r = u (red).
 
    BUILD      cc -O2 -I.. 08_warps.c -o 08_warps -lm -pthread
    RUN        ./08_warps [samples] [output]

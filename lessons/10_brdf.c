@@ -7,7 +7,8 @@
                   dE = L_i cos(theta_i) d omega_i
 
               per m^2 of the surface itself. (The slides also write per PROJECTED area: that would count the cosine
-              twice.) The surface answers with the radiance dL_r; the ratio is the BRDF, a number per steradian:
+              twice.) The surface answers with the radiance dL_r; the ratio is the BRDF, a number per steradian (the
+              BSDF, if light that passes through is counted as well):
 
                   f_r(omega_i -> omega_r) = dL_r(omega_r) / dE(omega_i) = dL_r / (L_i cos(theta_i) d omega_i)
                   ideal diffuse:   f = rho / pi                        the same for all pairs of directions
@@ -15,7 +16,11 @@
                   ideal specular:  f = a delta function                0 for every direction chosen beforehand
 
               Reciprocity: f is the same with its two directions exchanged. Energy: the albedo, the integral of f
-              cos(theta_r) d omega_r, is at most 1. f itself may be above 1: it is a density, not a share.
+              cos(theta_r) d omega_r, is at most 1: the share of the light from omega_i that is reflected. It is rho
+              for the diffuse surface, and for the glossy one k_s for light from straight above; from the side it is
+              less, for a part of the lobe is below the horizon. f itself may be above 1: it is a density, not a share.
+
+   PICTURE    Diffuse, glossy, mirror, in one light. Bright dots are light that came by way of a shiny ball.
 
    BUILD      cc -O2 -I.. 10_brdf.c -o 10_brdf -lm -pthread
    RUN        ./10_brdf [samples] [output]
@@ -63,7 +68,7 @@ static void row(const char *name, const pt_stats *s, double exact, double second
 
 /* ---- mine ---- */
 
-/* The surface, with z as its normal: reflectances, the lobe's exponent, and the same for the header. */
+/* The surface, with z as its normal: reflectances, the lobe's exponent; and the same for the header. */
 static double kd, ks, exponent;
 static pt_bsdf bsdf;
 /* Towards the eye and towards the middle of a lamp of radiance 1, and the half angle under which the lamp is seen. */
@@ -143,7 +148,7 @@ static double asymmetry(void)
     return most;
 }
 
-/* The three materials as balls in the same light. (Bright dots: light that came by way of a shiny ball.) */
+/* The three materials as balls in the same light. */
 static void picture(const pt_material *m, const char *output)
 {
     pt_scene scene = PT_SCENE_INIT;

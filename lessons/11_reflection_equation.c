@@ -2,21 +2,22 @@
 
    QUESTION   A lamp lights a floor. Which directions should one try to find out how bright the floor is?
 
-   IDEA       The reflection equation of the slides, and its Monte Carlo estimate:
+   IDEA       Direct lighting is one integral, the reflection equation of the slides, which has a Monte Carlo estimate:
 
                   L_r(p, omega_r) = integral over H^2 of f_r L_i(p, omega_i) cos(theta_i) d omega_i
                   L_r ~ 1/N sum of f_r L_i cos(theta_i) / p(omega_i)
 
-              Any density p that is not 0 where the lamp is gives the right mean. Four of them:
+              over the hemisphere H^2 above the point p. Any probability density, if not 0 towards the lamp, will do:
 
                   hemisphere    p = 1/(2 pi)         most directions miss the lamp: values 0
                   cosine        p = cos(theta)/pi    they still miss, but f cos / p = rho is constant
-                  area          p = r^2 / (cos(theta') A)     a point of the lamp, theta' at the lamp
-                  solid angle   p = 1/Omega          a direction of the lamp, only cos(theta) varies
+                  area          p = r^2 / (cos(theta') A)     a point of the area light, theta' there
+                  solid angle   p = 1/Omega          importance sampling of the lamp: only cos(theta) varies
 
-              For the third the integral is over the lamp's area: d omega = cos(theta') dA / r^2. Under the middle of
-              a square lamp of side 1, height 1 and radiance 1 Lambert's formula for polygons gives the irradiance E =
-              0.752275, and a diffuse floor of rho = 1/2 has L_r = rho E / pi.
+              For the third, d omega = cos(theta') dA / r^2. A square lamp of side, height and radiance 1 gives the
+              irradiance E = 0.752275 below its middle (Lambert's formula), and L_r = rho E / pi with rho = 1/2.
+
+   PICTURE    4 samples in each pixel, in strips from left to right: hemisphere, cosine, area, solid angle.
 
    BUILD      cc -O2 -I.. 11_reflection_equation.c -o 11_reflection_equation -lm -pthread
    RUN        ./11_reflection_equation [samples] [output]
@@ -30,13 +31,12 @@
                   for 0.1 % error 1.9e+03                                          0.001
 
    WORDS      reflection equation 反射方程; irradiance 辐照度; solid angle 立体角; hemisphere 半球; area light 面光源;
-              direct light 直接光照; importance sampling 重要性采样; probability density 概率密度
+              direct lighting 直接光照; importance sampling 重要性采样; probability density 概率密度
 
    HEADER     [PT-04] pt_spherical_rectangle_sample, [PT-05] pt_irradiance_polygon, [PT-11] pt_li_path_plain,
               pt_li_path_light
 
-   SOURCES    Lambert: Photometria, 1760; Urena, Fajardo, King: An Area-Preserving Parametrization for Spherical
-              Rectangles, 2013; the slides on the reflection equation
+   SOURCES    [Lam60]; [Ure13]; the slides on the reflection equation
 
    Before: lesson 10, BRDFs. Next: lesson 12, the rendering equation. */
 

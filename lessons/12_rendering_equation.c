@@ -2,22 +2,27 @@
 
    QUESTION   The light that a surface reflects was itself reflected elsewhere. How can one start to compute it?
 
-   IDEA       The slides replace L_i of the reflection equation by the L_o of the point that is seen there:
+   IDEA       The slides replace the incident L_i of the reflection equation by the exitant L_o of the point q that is
+              seen there, and add the emission L_e:
 
                   L_o(p, omega_o) = L_e(p, omega_o) + integral of L_o(q, -omega_i) f_r cos(theta_i) d omega_i
 
-              In short L = Le + T L. Put in for itself, again and again, this is the Neumann series
+              In short L = Le + T L: the operator T, light transport, is one bounce of all light. Put in for itself,
+              again and again, this is the Neumann series
 
                   L = Le + T Le + T^2 Le + T^3 Le + ...
 
               with one term for each number of edges of a path: T^k Le is the light that was reflected k times, on k+1
-              edges. A path that goes on by p(omega) carries the product of its f cos / p and collects at each end of
-              an edge what is emitted there: one value of every term at once. In a furnace, a closed box whose walls
-              all emit 1 and reflect rho, every term is known, and so is the variance of directions that are uniform
-              over the hemisphere, where f cos / p = 2 rho cos, with mean square 4/3 rho^2:
+              edges. A path that goes on by p(omega) carries the product of its f cos / p, its throughput, and collects
+              at each end of an edge what is emitted there: one value of every term at once. In the furnace test, a
+              closed box whose walls all emit 1 and reflect rho, every term is known, and so is the variance of
+              directions that are uniform over the hemisphere, where f cos / p = 2 rho cos, with mean square 4/3 rho^2.
+              Here rho = 1/2:
 
                   T^k Le = rho^k        sum of K terms = (1 - rho^K) / (1 - rho)        L = 1 / (1 - rho)
                   variance of the term of k reflections = (4/3)^k rho^(2k) - rho^(2k)
+
+   PICTURE    The Cornell box by light of exactly 1, 2, 3 (above), 4, 5 and 6 edges (below), made twice as bright.
 
    BUILD      cc -O2 -I.. 12_rendering_equation.c -o 12_rendering_equation -lm -pthread
    RUN        ./12_rendering_equation [samples] [output]
@@ -149,7 +154,7 @@ static void table(const char *who, void (*terms)(pt_ray, pt_sampler *, double *)
     check(agrees(&sum, 1 / (1 - rho)), "that is 1 / (1 - rho) but for rho^K");
 }
 
-/* The terms as pictures: the Cornell box by light of exactly 1, 2, 3, 4, 5 and 6 edges. */
+/* The terms as pictures: the Cornell box by light of exactly 1, 2, ... edges. */
 static void picture(const char *output)
 {
     static unsigned char rgb[SHOWN * SIZE * SIZE * 3];

@@ -46,6 +46,8 @@ awk '
     function inline(s,    n, i, j, code) {
         s = escaped(s)
         gsub(/\\\*/, "\002", s); gsub(/\\\|/, "\003", s); gsub(/\\_/, "_", s)
+        gsub(/\\&/, "\\&", s)
+        while (match(s, /\\[-+#.)]/)) s = substr(s, 1, RSTART - 1) substr(s, RSTART + 1)
         while ((i = index(s, "`")) > 0 && (j = index(substr(s, i + 1), "`")) > 1) {
             code[++n] = substr(s, i + 1, j - 1)
             s = substr(s, 1, i - 1) "\001" n "\001" substr(s, i + j + 1)

@@ -122,7 +122,10 @@ run()
 # awk: the lines of section `wanted` of the head comment, in text[1..count] without their common indentation.
 head_comment='
     function indent_of(s) { match(s, /^ */); return RLENGTH }
-    FNR == 1 { inside = 1; section = ""; count = 0; base = 999 }
+    FNR == 1 {
+        inside = 1; section = ""; count = 0; base = 999
+        sections = "QUESTION|IDEA|SLIDES|EXACT|REFERENCE|PHOTO|PICTURE|PLOT|BUILD|RUN|PRINTS|WORDS|HEADER|SOURCES|EXERCISES|Before"
+    }
     inside {
         line = $0
         closes = index(line, "*/")
@@ -130,7 +133,7 @@ head_comment='
         sub(/^\/\*/, "  ", line)
         sub(/^ \*( |$)/, "   ", line)
         sub(/[ \t\r]+$/, "", line)
-        if (match(line, /^ *(QUESTION|IDEA|BUILD|RUN|PRINTS|WORDS|HEADER|SOURCES|EXERCISES|Before):?( |$)/)) {
+        if (match(line, "^ *(" sections "):?( |$)")) {
             section = line
             sub(/^ */, "", section)
             sub(/[: ].*/, "", section)
@@ -150,11 +153,21 @@ head_comment='
     }
 '
 
+# awk: a line of text with its marks of Markdown escaped; at its start also those of lists, headings and quotes, and
+# "2. " or "2) ", which would become an item.
+markdown='
+    function escape(s) {
+        gsub(/[\\*<|]/, "\\\\&", s)
+        if (match(s, /^[0-9]+[.)] /)) s = substr(s, 1, RLENGTH - 2) "\\" substr(s, RLENGTH - 1)
+        else if (s ~ /^([-+#] |>)/) s = "\\" s
+        return s
+    }
+'
+
 # Prose with its deeper lines as code.
 prose() # NAME SECTION
 {
-    awk -v wanted="$2" "$head_comment"'
-        function escape(s) { gsub(/[\\*<|]/, "\\\\&", s); return s }
+    awk -v wanted="$2" "$markdown$head_comment"'
         function fence(open) { if (open != code) { if (open) print ""; print open ? "```text" : "```\n"; code = open } }
         END {
             for (i = 1; i <= count; i++) {
@@ -171,40 +184,99 @@ prose() # NAME SECTION
 
 title() { sed -n '1,3s/^[/ *]*\(Lesson [0-9][0-9]*:.*\)$/\1/p' "lessons/$1.c" | sed 's/ *\*\/ *$//; s/[. ]*$//' | head -n 1; }
 
-# Functions my_... with the comment above them.
+# The functions my_... with the comments above them, and what else of the file they use, in its order: constants, types,
+# small functions. Their names are found among the words of the code: those that a line at file level declares.
 extract() # NAME
 {
     awk '
-        /^\/\*/ { comment = ""; commenting = 1 }
-        commenting { comment = comment $0 "\n"; if (index($0, "*/")) commenting = 0; next }
-        /^(static|int|double|void|pt_).*[ *]my_[a-z0-9_]+\(/ && !/;$/ {
-            if (found++) print ""
-            printf "%s", comment
-            body = 1
+        # Code without its comments, strings, characters and members.
+        function bare(s,    i, j) {
+            gsub(/"([^"\\]|\\.)*"/, "\"\"", s)
+            gsub(/\047([^\047\\]|\\.)*\047/, "0", s)
+            gsub(/(->|\.)[a-z_]+/, "", s) # a member has a name of its own
+            while ((i = index(s, "/*")) > 0) {
+                j = index(substr(s, i + 2), "*/")
+                s = substr(s, 1, i - 1) " " (j ? substr(s, i + j + 3) : "")
+            }
+            return s
         }
-        body { print; if (/^\}/ || /^[a-z].*\}$/) body = 0; comment = ""; next }
-        { comment = "" }' "lessons/$1.c"
+        function depth_of(s,    opened) { opened = gsub(/[({]/, "&", s); return opened - gsub(/[)}]/, "&", s) }
+        function declare(word) { if (word != "" && !(word in owner)) owner[word] = items }
+
+        # The names that an item declares: a function, an enumeration, a type, or variables.
+        function names_of(s,    n, i, part) {
+            if (s ~ /^#define /) { sub(/^#define +/, "", s); sub(/[^A-Za-z0-9_].*/, "", s); declare(s); return }
+            if (s ~ /^enum/) {
+                sub(/^[^{]*[{]/, "", s)
+                n = split(s, part, /[,}]/)
+                for (i = 1; i <= n; i++) { sub(/=.*/, "", part[i]); gsub(/[^A-Za-z0-9_]/, "", part[i]); declare(part[i]) }
+                return
+            }
+            if (s !~ /^typedef/ && match(s, /^[A-Za-z0-9_ *]*\(/) && s !~ /^[^(]*=/ && substr(s, RLENGTH + 1, 1) != "*") {
+                s = substr(s, 1, RLENGTH - 1); sub(/.*[ *]/, "", s); declare(s); return
+            }
+            if (match(s, /\(\*(const )?[A-Za-z0-9_]+/)) { # a pointer to a function
+                s = substr(s, RSTART, RLENGTH); sub(/.*[ *]/, "", s); declare(s); return
+            }
+            while (gsub(/[{][^{}]*[}]|\[[^][]*\]|\([^()]*\)/, "", s)) ;
+            n = split(s, part, /[,;]/)
+            for (i = 1; i <= n; i++) { sub(/ *=.*/, "", part[i]); sub(/.*[ *]/, "", part[i]); declare(part[i]) }
+        }
+        function take(i,    n, k, word) {
+            if (taken[i]++) return
+            n = split(code[i], word, /[^A-Za-z0-9_]+/)
+            for (k = 1; k <= n; k++) if (word[k] in owner) take(owner[word[k]])
+        }
+
+        /^#include "pathtracer.h"/ { inside = 1; next }
+        /^\/\* EXERCISES/ { exit }
+        !inside { next }
+        open == 0 && !started && /^\/\*/ { comment = ""; commenting = 1 }
+        commenting { comment = comment $0 "\n"; if (index($0, "*/")) commenting = 0; next }
+        !started && /^ *$/ { comment = ""; next }
+        !started && /^#/ && !/^#define / { next }
+        !started { started = 1; text[++items] = comment; comment = "" }
+        {
+            text[items] = text[items] $0 "\n"
+            line = $0 ~ /^#(if|el|en)/ ? "" : bare($0)
+            code[items] = code[items] line "\n"
+            open += depth_of(line)
+            if (open == 0 && (line ~ /[;}] *$/ || line ~ /^#define/)) {
+                names_of(code[items])
+                mine[items] = code[items] ~ /^[a-z][^=;{]*[ *]my_[a-z0-9_]+\(/
+                function_at[items] = code[items] ~ /[)]\n?[ ]*[{]/ && code[items] ~ /[}][ \n]*$/
+                started = 0
+            }
+        }
+        END {
+            for (i = 1; i <= items; i++) if (mine[i]) take(i)
+            for (i = 1; i <= items; i++) {
+                if (!taken[i]) continue
+                sub(/, MISTAKE = [^}]*[}]/, " }", text[i]) # for the end of main alone
+                if (shown++ && (function_at[i] || function_at[last] || text[i] ~ /^\/\*/)) print ""
+                printf "%s", text[i]
+                last = i
+            }
+        }' "lessons/$1.c"
 }
 
+# The items count up from 1 and begin in one column; any other number at the start of a line is text.
 exercises_of() # NAME
 {
-    awk '
+    awk "$markdown"'
         /EXERCISES/ && /^[\/ *]*EXERCISES/ { inside = 1; count = 0; next }
         inside {
             closes = index($0, "*/")
             if (closes) $0 = substr($0, 1, closes - 1)
-            sub(/^[ \t]*\*?[ \t]*/, "")
+            match($0, /^[ \t]*\*?[ \t]*/)
+            column = RLENGTH
+            $0 = substr($0, column + 1)
             sub(/[ \t\r]+$/, "")
-            if (/^\(?[1-9][).]/) { sub(/^\(?[1-9][).] */, ""); item[++count] = $0 }
-            else if (count && $0 != "") item[count] = item[count] "\n" $0
+            if ((count == 0 || column == first) && match($0, "^\\(?" (count + 1) "[).]( |$)")) {
+                first = column
+                print ++count ". " escape(substr($0, RLENGTH + 1))
+            } else if (count && $0 != "") print "   " escape($0)
             if (closes) inside = 0
-        }
-        END {
-            for (i = 1; i <= count; i++) {
-                gsub(/[\\*<|]/, "\\\\&", item[i])
-                gsub(/\n/, "\n   ", item[i])
-                print i ". " item[i]
-            }
         }' "lessons/$1.c"
 }
 
@@ -228,6 +300,29 @@ words_of() # NAME...
     done
 }
 
+# The parts that only some lessons have, in the order of the head comment.
+asides() # NAME
+{
+    awk '/^[ *]*(EXACT|SLIDES|REFERENCE|PHOTO)[: ]/ { sub(/^[ *]*/, ""); sub(/[: ].*/, ""); print }
+        /\*\// { exit }' "lessons/$1.c"
+}
+
+# A picture with what the head comment says of it: for those who do not see it, and below it.
+picture() # NAME KIND SECTION
+{
+    [ -f "lessons/img/$1.$2" ] || return 0
+    caption=$(prose "$1" "$3")
+    plain=$(awk -v wanted="$3" "$head_comment"'
+        END {
+            for (i = 1; i <= count; i++) {
+                gsub(/["*|<]|\\|\[|\]/, "", text[i]) # no marks there
+                printf "%s%s", (i > 1 ? " " : ""), text[i]
+            }
+        }' "lessons/$1.c")
+    printf '![%s](img/%s)\n\n' "${plain:-$(title "$1")}" "$1.$2"
+    [ -z "$caption" ] || printf '*%s*\n\n' "$caption"
+}
+
 section() # NAME OUTPUT
 {
     name=$1
@@ -238,9 +333,18 @@ section() # NAME OUTPUT
     echo
     prose "$name" IDEA
     echo
-    for picture in lessons/img/"$name".png lessons/img/"$name".svg; do
-        [ ! -f "$picture" ] || printf '![%s](img/%s)\n\n' "$(title "$name")" "${picture##*/}"
+    for part in $(asides "$name"); do
+        case $part in
+        EXACT) title_of_part='Exact values' ;;
+        SLIDES) title_of_part='The slides' ;;
+        REFERENCE) title_of_part='The reference' ;;
+        PHOTO) title_of_part='And a photograph' ;;
+        esac
+        echo "**$title_of_part.** $(prose "$name" "$part")"
+        echo
     done
+    picture "$name" png PICTURE
+    picture "$name" svg PLOT
     echo "[$name.c]($name.c) prints:"
     echo
     echo '<!-- printed -->'
@@ -291,9 +395,10 @@ words()
     # shellcheck disable=SC2046
     words_of $(names) | sort -f -t '	' -k1,1 -k3,3 | awk -F '\t' '
         function flush() { if (english != "") print "| " english " | " chinese " | " numbers " |" }
+        function plain(s) { sub(/\(.*/, "", s); return s } # a word with and without a remark is one word
         tolower($1) == tolower(english) {
             if (index(numbers, $3) == 0) numbers = numbers ", " $3
-            if (index(chinese, $2) == 0) chinese = chinese ", " $2
+            if (index(chinese, plain($2)) == 0) chinese = chinese ", " $2
             next
         }
         { flush(); english = $1; chinese = $2; numbers = $3 }
@@ -424,7 +529,7 @@ case ${1-} in
 run | write | exercises) "$@" ;;
 text) assemble > "$2" ;;
 quick) shift; quick "$@" ;;
-title | numbers_of | extract) "$@" ;;
+title | numbers_of | extract | words_of) "$@" ;;
 names) shift; names "$@" ;;
 *)
     echo 'usage: course.sh run | write | exercises [NN ...]; course.sh text FILE' >&2

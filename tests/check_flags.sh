@@ -3,47 +3,45 @@
 # numbers (triangles, shared edges, spheres, boxes, a closed mesh) with every compiler at hand, at all levels, with the
 # machine's own instructions and with fused multiply-adds wherever the compiler likes; in float and in double.
 #
-#   sh tests/check_flags.sh        in the project's top directory; .ci/run calls it
+#   sh tests/check_flags.sh        in the project's top directory, JOBS (2) at a time; .ci/run calls it
 
 set -u
 dir=build/check_flags
-groups='triangles shared_edges spheres boxes closed_mesh hostile_numbers'
-passed=0
-failed=0
+rm -rf "$dir"
 mkdir -p "$dir" || exit 1
 
-# decisions COMPILER FLAGS...: builds and runs those groups; one check more or less
-decisions()
-{
-    if ! "$@" -std=c99 -I. -Itests tests/test_stress.c -o "$dir/decisions" -lm -pthread > "$dir/cc.out" 2>&1; then
-        failed=$((failed + 1))
-        echo "FAIL   $*: does not compile"
-        head -n 5 "$dir/cc.out"
-        return
-    fi
-    # shellcheck disable=SC2086
-    if "$dir/decisions" $groups > "$dir/run.out" 2>&1; then
-        passed=$((passed + 1))
-        echo "ok     $*"
-    else
-        failed=$((failed + 1))
-        echo "FAIL   $*"
-        grep FAIL "$dir/run.out" | head -n 5
-    fi
-}
+# One line of the list: NAME COMPILER FLAGS. Its verdict goes to NAME.out.
+cat > "$dir/one" << 'END'
+name=$1
+shift
+groups='triangles shared_edges spheres boxes closed_mesh hostile_numbers'
+dir=build/check_flags
+if ! "$@" -std=c99 -I. -Itests tests/test_stress.c -o "$dir/$name" -lm -pthread > "$dir/$name.cc" 2>&1; then
+    { echo "FAIL   $*: does not compile"; head -n 5 "$dir/$name.cc"; } > "$dir/$name.out"
+elif "$dir/$name" $groups > "$dir/$name.run" 2>&1; then
+    echo "ok     $*" > "$dir/$name.out"
+else
+    { echo "FAIL   $*"; grep FAIL "$dir/$name.run" | head -n 5; } > "$dir/$name.out"
+fi
+END
 
+n=10
 for cc in gcc clang; do
     if ! command -v $cc > /dev/null 2>&1; then
-        echo "skip   $cc is not installed"
+        echo "skip   $cc is not installed" >&2
         continue
     fi
     for real in -UPT_DOUBLE -DPT_DOUBLE; do
-        for flags in '-O0' '-O1 -ffp-contract=fast' '-O2 -ffp-contract=off' '-O3 -ffp-contract=fast' \
-            '-O3 -march=native -ffp-contract=fast' '-O2 -march=native -ffp-contract=off'; do
-            # shellcheck disable=SC2086
-            decisions $cc $real $flags
+        for flags in '-O0' '-O1 -ffp-contract=fast' '-O3 -ffp-contract=fast' '-O3 -march=native -ffp-contract=fast' \
+            '-O2 -march=native -ffp-contract=off'; do
+            n=$((n + 1))
+            echo "run$n $cc $real $flags"
         done
     done
-done
-echo "$passed passed, $failed failed"
-[ "$failed" = 0 ]
+done > "$dir/list"
+xargs -P "${JOBS:-2}" -L 1 sh "$dir/one" < "$dir/list"
+cat "$dir"/run*.out
+passed=$(grep -c '^ok' "$dir"/run*.out | awk -F: '{ n += $NF } END { print n + 0 }')
+wanted=$(wc -l < "$dir/list")
+echo "$passed passed, $((wanted - passed)) failed"
+[ "$passed" = "$wanted" ] && [ "$passed" -gt 0 ]

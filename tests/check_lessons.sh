@@ -39,24 +39,38 @@ check $? "there are lessons: $(echo "$lessons" | wc -l | tr -d ' ')"
 
 # ---- the text ------------------------------------------------------------------------------------
 
-# The parts of the head comment, in their order, and the exercises at the end.
-parts_of()
+# The parts of the head comment in their order, none of them unknown, and the exercises at the end.
+parts_of() # FILE PARTS
 {
-    awk '
-        FNR == 1 { n = split("Lesson QUESTION IDEA BUILD PRINTS WORDS HEADER SOURCES Before", want, " "); k = 1 }
+    awk -v parts="$2" '
+        FNR == 1 {
+            n = split("Lesson QUESTION IDEA " parts " BUILD PRINTS WORDS HEADER SOURCES Before", want, " ")
+            k = 1
+            known = " QUESTION IDEA SLIDES EXACT REFERENCE PHOTO PICTURE PLOT BUILD RUN PRINTS WORDS HEADER SOURCES "
+        }
         k <= n && match($0, "^[/ *]*" want[k] "[: ]|^[/ *]*" want[k] "$") { k++ }
+        /^   [A-Z][A-Z]+( |$)/ && !index(known, " " $1 " ") { print FILENAME ": no part of a lesson: " $1 }
         /#define PATHTRACER_IMPLEMENTATION/ { exit }
         END { if (k <= n) print FILENAME ": no " want[k] " where it is expected" }' "$1"
     grep -qE '^[/ *]*EXERCISES' "$1" || echo "$1: no EXERCISES"
 }
 
 wrong=
+demanding=
 for name in $lessons; do
     file=lessons/$name.c
-    text=$(parts_of "$file")
+    number=${name%%_*}
+    parts=
+    case $number in
+    19 | 25) most=240 ;; # a whole tree, a whole path tracer
+    *) most=220 ;;
+    esac
+    demanding="$demanding $name"
+    [ ! -f "lessons/img/$name.png" ] || parts=PICTURE
+    [ ! -f "lessons/img/$name.svg" ] || parts="$parts PLOT"
+    text=$(parts_of "$file" "$parts")
     [ -z "$text" ] || wrong="$wrong$text
 "
-    number=${name%%_*}
     title=$(sh lessons/course.sh title "$name")
     case $title in
     "Lesson $number: "?*) ;;
@@ -66,16 +80,51 @@ for name in $lessons; do
     [ -n "$(sh lessons/course.sh extract "$name")" ] || wrong="$wrong$file: no function my_...
 "
     lines=$(wc -l < "$file")
-    case $number in
-    0? | 1[0-2]) most=220 ;;
-    *) most=340 ;;
-    esac
     [ "$lines" -le $most ] || wrong="$wrong$file: $lines lines
 "
     [ -f "lessons/img/$name.png" ] || [ -f "lessons/img/$name.svg" ] || wrong="$wrong$file: no picture in lessons/img
 "
 done
 none 'each lesson has its parts, a title, a function my_... and a picture' "$wrong"
+
+# What a reader of the page sees as items, at whatever depth.
+wrong=
+for name in $lessons; do
+    number=${name%%_*}
+    items=$(awk -v begin="<!-- lesson $number -->" -v end="<!-- end of lesson $number -->" '
+        $0 == begin { inside = 1 }
+        $0 == end { exit }
+        inside && /^\*\*/ { listed = /^\*\*Exercises\.\*\*/ }
+        listed && /^ *([0-9]+[.)]|[-+*]) / { printf "%s ", $0 ~ /^ / ? "(" $1 ")" : $1 }' lessons/README.md)
+    [ "$items" = '1. 2. 3. ' ] || wrong="$wrong lesson $number: $items
+"
+done
+none 'each lesson shows three exercises, 1 2 3' "$wrong"
+
+# The words of a list are used: in the lesson's text on the page, or in what is said there for the class.
+wrong=
+for name in $demanding; do
+    number=${name%%_*}
+    awk -v begin="<!-- lesson $number -->" '
+        $0 == begin { inside = 1; next }
+        inside && /^<!-- (lesson|more)/ { exit }
+        inside && /^\*\*/ { listed = /^\*\*Words/ }
+        inside && !listed' lessons/README.md | tr '\n' ' ' | tr 'A-Z' 'a-z' | sed 's/  */ /g; s/colour/color/g' > "$dir/text"
+    sh lessons/course.sh words_of "$name" | cut -f 1 | tr 'A-Z' 'a-z' > "$dir/words"
+    while IFS= read -r word; do
+        grep -qF -e "$word" "$dir/text" || wrong="$wrong lesson $number: $word
+"
+    done < "$dir/words"
+done
+none 'the words of a lesson are used in it' "$wrong"
+
+# shellcheck disable=SC2086
+wrong=$(sh lessons/course.sh words_of $demanding | awk -F '\t' '
+    { english = tolower($1); chinese = $2; sub(/\(.*/, "", chinese) }
+    english in other && other[english] != chinese { print english ": " other[english] ", " chinese }
+    chinese in term && term[chinese] != english { print chinese ": " term[chinese] ", " english }
+    { other[english] = chinese; term[chinese] = english }')
+none 'a word is called the same in all lessons, in both languages' "$wrong"
 
 wrong=
 for number in $(echo "$lessons" | cut -c 1-2 | sort | uniq -d); do wrong="$wrong two lessons $number"; done

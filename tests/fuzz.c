@@ -576,7 +576,7 @@ static void films(void)
 static void files(void)
 {
     static const char *const heads[6] = {"P6\n3 2\n255\n", "PF\n3 2\n-1.0\n",
-                                         "PF\n3 2\n1.0\n", "P6\n4000 4000\n255\n",
+                                         "PF\n3 2\n1.0\n", "P6\n65536 65536\n255\n",
                                          "PF\n-3 2\n0\n",  "P6 # x\n99999999999 1\n65536\n"};
     const char *const path = "build/fuzz.bin";
     unsigned char bytes[160];
