@@ -177,9 +177,9 @@ static double try_triangle(const trial *q, const place *p, int *wrong)
     *wrong += want >= 0 && got != want;
     if (!got || want != 1) return 0;
     seen(t + w[0] + w[1]);
-    x = pti_shear(&r, a);
-    y = pti_shear(&r, b);
-    z = pti_shear(&r, c);
+    x = pti_shear(&r, &a);
+    y = pti_shear(&r, &b);
+    z = pti_shear(&r, &c);
     u = pti_edge(z.x, y.y, z.y, y.x);
     v = pti_edge(x.x, z.y, x.y, z.x);
     ww = pti_edge(y.x, x.y, y.y, x.x);
@@ -711,6 +711,9 @@ static int other_hits(const pt_scene *scene, int rays, int *hits)
     pt_pcg32 rng = pt_pcg32_make(907, 0);
     int i, other = 0;
     flat.bvh.node_count = 0;
+#if PTI_HAS_WIDE
+    flat.wide.bytes = 0;
+#endif
     for (i = *hits = 0; i < rays; i++) {
         const pt_vec3 from = in_cube(&rng, 2), to = target(scene, i, &rng);
         const pt_ray ray = ray_from(from, i % 7 ? pt_v3_sub(to, from) : v3(i % 3 - 1, i / 3 % 3 - 1, 1));
