@@ -261,6 +261,7 @@
 #else
 #define PTI_HAS_WIDE (PTI_HAS_SIMD && PTI_HAS_BVH)
 #endif
+#define PTI_HAS_LOCKSTEP PTI_HAS_WIDE
 #ifdef PT_NO_ENVIRONMENT
 #define PTI_HAS_ENVIRONMENT 0
 #else
@@ -1484,7 +1485,8 @@ PTDEF void pt_film_error(const pt_film *film, const float *reference, pt_error *
    ===================================================================================================== */
 
 typedef enum pt_roulette {
-    PT_ROULETTE_THROUGHPUT = 0, /* survive with min(1 - 2^-24, largest band of throughput, corrected for eta^2)  */
+    PT_ROULETTE_THROUGHPUT = 0, /* survive with min(1 - 2^-24, roulette_scale * largest band of throughput, corrected
+                                   for eta^2)                                                              */
     PT_ROULETTE_CONSTANT,       /* survive with roulette_survival, as the slides' P_RR                       */
     PT_ROULETTE_NONE            /* only max_edges ends a path: needs max_edges > 0                           */
 } pt_roulette;
@@ -1530,6 +1532,8 @@ typedef struct pt_li_options {
     int max_edges;              /* 0 = no limit; see CONVENTIONS                                           */
     pt_roulette roulette;
     pt_real roulette_survival;  /* PT_ROULETTE_CONSTANT: in (0, 1); 0 = 0.8                                */
+    pt_real roulette_scale;     /* PT_ROULETTE_THROUGHPUT: > 1 lets paths live longer, which pays where edges are cheap
+                                   and their numbers well spread; 0 = 1, in lockstep 4                     */
     int roulette_start;         /* edges before the first roulette, >= 1; 0 = 1 if constant, else 3        */
     pt_heuristic heuristic;     /* of multiple importance sampling                                         */
 #if PTI_HAS_WHITTED
@@ -1773,6 +1777,7 @@ typedef struct pt_render_desc {
     int aov;                    /* 1: also albedo, normal and depth                                        */
     int single_net;             /* 1: all samples in one half: better Sobol points, no error estimate      */
     int general_body;           /* 1: always the general instance of the integrator (for comparison)       */
+    int no_lockstep;            /* 1: paths one after the other, also where several could walk together    */
     const float *reference;     /* a converged picture, width * height * 3, for the true error; NULL       */
     double reference_mse_001;   /* that reference's own error, subtracted from relmse_001                  */
     pt_parallel_fn parallel;    /* NULL = own threads                                                      */
@@ -2583,22 +2588,24 @@ PTI_INLINE uint32_t pti_reverse_bits(uint32_t x)
     return ((x & 0x55555555u) << 1) | ((x & 0xaaaaaaaau) >> 1);
 }
 
+/* Columns of the matrices of dimensions 2 and 3, made from (s, a, m) = (2, 1, {1,3}) and (3, 1, {1,3,1}) by the recurrence
+   of [Joe08]; their bits are reversed. */
+static const uint32_t pti_sobol_columns[2][32] = {
+    {0x00000001u, 0x00000003u, 0x00000006u, 0x00000009u, 0x00000017u, 0x0000003au, 0x00000071u, 0x000000a3u,
+     0x00000116u, 0x00000339u, 0x00000677u, 0x000009aau, 0x00001601u, 0x00003903u, 0x00007706u, 0x0000aa09u,
+     0x00010117u, 0x0003033au, 0x00060671u, 0x000909a3u, 0x00171616u, 0x003a3939u, 0x00717777u, 0x00a3aaaau,
+     0x01170001u, 0x033a0003u, 0x06710006u, 0x09a30009u, 0x16160017u, 0x3939003au, 0x77770071u, 0xaaaa00a3u},
+    {0x00000001u, 0x00000003u, 0x00000004u, 0x0000000au, 0x0000001fu, 0x0000002eu, 0x00000045u, 0x000000c9u,
+     0x0000011bu, 0x000002a4u, 0x0000079au, 0x00000b67u, 0x0000101eu, 0x0000302du, 0x00004041u, 0x0000a0c3u,
+     0x0001f104u, 0x0002e28au, 0x000457dfu, 0x000c9baeu, 0x0011a105u, 0x002a7289u, 0x0079e7dbu, 0x00b6dba4u,
+     0x0100011au, 0x030002a7u, 0x0400079eu, 0x0a000b6du, 0x1f001001u, 0x2e003003u, 0x45004004u, 0xc900a00au}
+};
+
 /* Sobol point n of dimension d with its bits reversed (the first binary digit is bit 0). Dimension 0 is the
    van der Corput sequence, whose reversed bits are n itself. The matrix of dimension 1 is Pascal's triangle
-   modulo 2: a Kronecker power of ((1 1)(0 1)), hence five masked shifts. Dimensions 2 and 3 sum columns, made
-   from (s, a, m) = (2, 1, {1,3}) and (3, 1, {1,3,1}) by the recurrence of [Joe08]. */
+   modulo 2: a Kronecker power of ((1 1)(0 1)), hence five masked shifts. Dimensions 2 and 3 sum columns. */
 static uint32_t pti_sobol_reversed(uint32_t n, int d)
 {
-    static const uint32_t columns[2][32] = {
-        {0x00000001u, 0x00000003u, 0x00000006u, 0x00000009u, 0x00000017u, 0x0000003au, 0x00000071u, 0x000000a3u,
-         0x00000116u, 0x00000339u, 0x00000677u, 0x000009aau, 0x00001601u, 0x00003903u, 0x00007706u, 0x0000aa09u,
-         0x00010117u, 0x0003033au, 0x00060671u, 0x000909a3u, 0x00171616u, 0x003a3939u, 0x00717777u, 0x00a3aaaau,
-         0x01170001u, 0x033a0003u, 0x06710006u, 0x09a30009u, 0x16160017u, 0x3939003au, 0x77770071u, 0xaaaa00a3u},
-        {0x00000001u, 0x00000003u, 0x00000004u, 0x0000000au, 0x0000001fu, 0x0000002eu, 0x00000045u, 0x000000c9u,
-         0x0000011bu, 0x000002a4u, 0x0000079au, 0x00000b67u, 0x0000101eu, 0x0000302du, 0x00004041u, 0x0000a0c3u,
-         0x0001f104u, 0x0002e28au, 0x000457dfu, 0x000c9baeu, 0x0011a105u, 0x002a7289u, 0x0079e7dbu, 0x00b6dba4u,
-         0x0100011au, 0x030002a7u, 0x0400079eu, 0x0a000b6du, 0x1f001001u, 0x2e003003u, 0x45004004u, 0xc900a00au}
-    };
     uint32_t x = 0;
     int bit;
     if (d == 0) return n;
@@ -2609,7 +2616,7 @@ static uint32_t pti_sobol_reversed(uint32_t n, int d)
         n ^= (n >> 8) & 0x00ff00ffu;
         return n ^ ((n >> 16) & 0x0000ffffu);
     }
-    for (bit = 0; n; bit++, n >>= 1) x ^= columns[d - 2][bit] & (0u - (n & 1u));
+    for (bit = 0; n; bit++, n >>= 1) x ^= pti_sobol_columns[d - 2][bit] & (0u - (n & 1u));
     return x;
 }
 
@@ -8906,7 +8913,7 @@ PTI_INLINE int pti_roulette(pti_walk *w)
     double q;
     if (o->roulette == PT_ROULETTE_NONE || w->edges < start) return 1;
     if (constant) q = o->roulette_survival > 0 ? (double)o->roulette_survival : 0.8;
-    else q = fmax(w->beta.r, fmax(w->beta.g, w->beta.b)) * w->eta2;
+    else q = (o->roulette_scale > 0 ? (double)o->roulette_scale : 1) * fmax(w->beta.r, fmax(w->beta.g, w->beta.b)) * w->eta2;
     q = fmin(q, 1 - PTI_2_M24);
     pt_sampler_seek(w->sampler, PT_DIM_EDGE(w->edges) + PT_DIM_ROULETTE);
     if (!(pti_draw(w->sampler) < q)) return 0;
@@ -9257,6 +9264,1102 @@ PTDEF pt_rgbd pt_li_branching(const pt_scene *scene, const pt_ray *ray, pt_sampl
 }
 #endif
 
+
+/* =====================================================================================================
+   [PT-11b] LOCKSTEP: implementation
+   =====================================================================================================
+   A path of a small scene spends its time on a few dozen multiplications at a time, one path after the other. Here as
+   many paths as the machine has lanes walk together: each instruction takes one step of all of them, and a lane whose
+   path has ended takes the next path from a queue ([Lai13] for GPUs; here it is the lanes of one core). The estimator
+   is that of pti_path, with three differences that change no expectation:
+
+   - Lights are sampled by area (spheres by their cone), since the weights of multiple importance sampling, with which
+     each technique is used here too, take away what the solid angle would [Vea97] 9.2.
+   - The numbers of the camera and of the first vertex are those of the sampler, Owen-scrambled points by default; all
+     later ones come from a generator in each lane, xoroshiro64* [Bla21], seeded by a hash of pixel and sample. So a
+     path is a function of (seed, pixel, sample) alone, whatever lane it is in and whoever is beside it.
+   - Decisions are made in float. A hit point is put back on the plane of its primitive, in a distance of at least
+     16 e from the primitive's edges, and the next ray starts 2 e above it; e is the bound of the distance of a computed
+     point from its plane (derived at pti_lockstep_make). Primitives are wider by what rounding can do to a hit, so
+     that no ray passes between two that share an edge. Scenes with parts smaller than 4096 e are left to pti_path.
+
+   A shadow ray starts and ends on surfaces. A plane that has all surfaces on one side cannot come between two points
+   of them: the walls of a room are not asked. Parallelograms whose edges follow two axes are tested by three
+   multiplications and four comparisons. */
+
+#if PTI_HAS_LOCKSTEP
+
+/* --- lanes: pti_fw floats, pti_mw truth values, pti_uw words of 32 bits, PTI_WIDTH of each --- */
+
+#if PTI_LANES == 2 && defined(__AVX512F__) && defined(__AVX512DQ__)
+#define PTI_WIDTH 16
+typedef __m512 pti_fw;
+typedef __mmask16 pti_mw;
+typedef __m512i pti_uw;
+#define PTI_FW(T, name, wide) \
+    PTI_INLINE T pti_fw_##name(pti_fw x, pti_fw y) { (void)y; return wide; }
+PTI_FW(pti_fw, add, _mm512_add_ps(x, y))
+PTI_FW(pti_fw, sub, _mm512_sub_ps(x, y))
+PTI_FW(pti_fw, mul, _mm512_mul_ps(x, y))
+PTI_FW(pti_fw, div, _mm512_div_ps(x, y))
+PTI_FW(pti_fw, min, _mm512_min_ps(x, y))
+PTI_FW(pti_fw, max, _mm512_max_ps(x, y))
+PTI_FW(pti_mw, lt, _mm512_cmp_ps_mask(x, y, _CMP_LT_OQ))
+PTI_FW(pti_mw, le, _mm512_cmp_ps_mask(x, y, _CMP_LE_OQ))
+PTI_INLINE pti_fw pti_fw_sqrt(pti_fw x) { return _mm512_sqrt_ps(x); }
+PTI_INLINE pti_fw pti_fw_abs(pti_fw x) { return _mm512_abs_ps(x); }
+PTI_INLINE pti_fw pti_fw_set(float x) { return _mm512_set1_ps(x); }
+PTI_INLINE pti_fw pti_fw_madd(pti_fw x, pti_fw y, pti_fw z) { return _mm512_fmadd_ps(x, y, z); }
+PTI_INLINE pti_fw pti_fw_nmadd(pti_fw x, pti_fw y, pti_fw z) { return _mm512_fnmadd_ps(x, y, z); }
+PTI_INLINE pti_fw pti_fw_select(pti_mw m, pti_fw x, pti_fw y) { return _mm512_mask_blend_ps(m, y, x); }
+PTI_INLINE unsigned pti_mw_bits(pti_mw m) { return m; }
+PTI_INLINE pti_mw pti_mw_of_bits(unsigned bits) { return (pti_mw)bits; }
+PTI_INLINE pti_mw pti_mw_and(pti_mw a, pti_mw b) { return (pti_mw)(a & b); }
+PTI_INLINE pti_mw pti_mw_or(pti_mw a, pti_mw b) { return (pti_mw)(a | b); }
+#else
+#define PTI_WIDTH 8
+typedef pti_f8 pti_fw;
+typedef pti_m8 pti_mw;
+#define pti_fw_add pti_f8_add
+#define pti_fw_sub pti_f8_sub
+#define pti_fw_mul pti_f8_mul
+#define pti_fw_div pti_f8_div
+#define pti_fw_min pti_f8_min
+#define pti_fw_max pti_f8_max
+#define pti_fw_lt pti_f8_lt
+#define pti_fw_le pti_f8_le
+#define pti_fw_sqrt pti_f8_sqrt
+#define pti_fw_abs pti_f8_abs
+#define pti_fw_set pti_f8_set
+#define pti_fw_madd pti_f8_madd
+#define pti_fw_nmadd pti_f8_nmadd
+#define pti_fw_select pti_f8_select
+#define pti_mw_bits pti_m8_bits
+#if PTI_LANES == 2
+typedef __m256i pti_uw;
+PTI_INLINE pti_mw pti_mw_and(pti_mw a, pti_mw b) { return _mm256_and_ps(a, b); }
+PTI_INLINE pti_mw pti_mw_or(pti_mw a, pti_mw b) { return _mm256_or_ps(a, b); }
+PTI_INLINE pti_mw pti_mw_of_bits(unsigned bits)
+{
+    const __m256i bit = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+    return _mm256_castsi256_ps(_mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32((int)bits), bit), bit));
+}
+#elif PTI_LANES == 1
+typedef struct pti_uw {
+    __m128i a, b;
+} pti_uw;
+PTI_INLINE pti_mw pti_mw_and(pti_mw x, pti_mw y) { return pti_f8_pair(_mm_and_ps(x.a, y.a), _mm_and_ps(x.b, y.b)); }
+PTI_INLINE pti_mw pti_mw_or(pti_mw x, pti_mw y) { return pti_f8_pair(_mm_or_ps(x.a, y.a), _mm_or_ps(x.b, y.b)); }
+PTI_INLINE pti_mw pti_mw_of_bits(unsigned bits)
+{
+    const __m128i low = _mm_setr_epi32(1, 2, 4, 8), high = _mm_setr_epi32(16, 32, 64, 128), x = _mm_set1_epi32((int)bits);
+    return pti_f8_pair(_mm_castsi128_ps(_mm_cmpeq_epi32(_mm_and_si128(x, low), low)),
+                       _mm_castsi128_ps(_mm_cmpeq_epi32(_mm_and_si128(x, high), high)));
+}
+/* The low halves of products: SSE2 multiplies the even lanes only. */
+PTI_INLINE __m128i pti_mul4(__m128i x, __m128i y)
+{
+    const __m128i even = _mm_mul_epu32(x, y), odd = _mm_mul_epu32(_mm_srli_epi64(x, 32), _mm_srli_epi64(y, 32));
+    return _mm_unpacklo_epi32(_mm_shuffle_epi32(even, _MM_SHUFFLE(0, 0, 2, 0)), _mm_shuffle_epi32(odd, _MM_SHUFFLE(0, 0, 2, 0)));
+}
+#else
+typedef struct pti_uw {
+    uint32_t v[8];
+} pti_uw;
+PTI_INLINE pti_mw pti_mw_and(pti_mw x, pti_mw y)
+{
+    int i;
+    for (i = 0; i < 8; i++) x.v[i] &= y.v[i];
+    return x;
+}
+PTI_INLINE pti_mw pti_mw_or(pti_mw x, pti_mw y)
+{
+    int i;
+    for (i = 0; i < 8; i++) x.v[i] |= y.v[i];
+    return x;
+}
+PTI_INLINE pti_mw pti_mw_of_bits(unsigned bits)
+{
+    pti_mw m;
+    int i;
+    for (i = 0; i < 8; i++) m.v[i] = -(int32_t)(bits >> i & 1);
+    return m;
+}
+#endif
+#endif
+
+/* Operations on words; n: how far a shift goes. */
+#if PTI_WIDTH == 16
+#define PTI_UW(name, wide, avx, sse, plain) \
+    PTI_INLINE pti_uw pti_uw_##name(pti_uw x, pti_uw y, int n) { (void)y; (void)n; return wide; }
+PTI_INLINE pti_uw pti_uw_set(uint32_t x) { return _mm512_set1_epi32((int)x); }
+#elif PTI_LANES == 2
+#define PTI_UW(name, wide, avx, sse, plain) \
+    PTI_INLINE pti_uw pti_uw_##name(pti_uw x, pti_uw y, int n) { (void)y; (void)n; return avx; }
+PTI_INLINE pti_uw pti_uw_set(uint32_t x) { return _mm256_set1_epi32((int)x); }
+#elif PTI_LANES == 1
+#define PTI_UW(name, wide, avx, sse, plain)                                    \
+    PTI_INLINE pti_uw pti_uw_##name(pti_uw p, pti_uw q, int n)                  \
+    {                                                                          \
+        { const __m128i x = p.a, y = q.a; (void)y; (void)n; p.a = sse; }       \
+        { const __m128i x = p.b, y = q.b; (void)y; (void)n; p.b = sse; }       \
+        return p;                                                              \
+    }
+PTI_INLINE pti_uw pti_uw_set(uint32_t x)
+{
+    pti_uw r;
+    r.a = r.b = _mm_set1_epi32((int)x);
+    return r;
+}
+#else
+#define PTI_UW(name, wide, avx, sse, plain)                     \
+    PTI_INLINE pti_uw pti_uw_##name(pti_uw p, pti_uw q, int n)   \
+    {                                                           \
+        int i;                                                  \
+        for (i = 0; i < 8; i++) {                               \
+            const uint32_t x = p.v[i], y = q.v[i];              \
+            (void)y;                                            \
+            (void)n;                                            \
+            p.v[i] = plain;                                     \
+        }                                                       \
+        return p;                                               \
+    }
+PTI_INLINE pti_uw pti_uw_set(uint32_t x)
+{
+    pti_uw r;
+    int i;
+    for (i = 0; i < 8; i++) r.v[i] = x;
+    return r;
+}
+#endif
+PTI_UW(sum, _mm512_add_epi32(x, y), _mm256_add_epi32(x, y), _mm_add_epi32(x, y), x + y)
+PTI_UW(product, _mm512_mullo_epi32(x, y), _mm256_mullo_epi32(x, y), pti_mul4(x, y), x * y)
+PTI_UW(xor2, _mm512_xor_si512(x, y), _mm256_xor_si256(x, y), _mm_xor_si128(x, y), x ^ y)
+PTI_UW(or2, _mm512_or_si512(x, y), _mm256_or_si256(x, y), _mm_or_si128(x, y), x | y)
+PTI_UW(and2, _mm512_and_si512(x, y), _mm256_and_si256(x, y), _mm_and_si128(x, y), x & y)
+PTI_UW(left, _mm512_sll_epi32(x, _mm_cvtsi32_si128(n)), _mm256_slli_epi32(x, n), _mm_slli_epi32(x, n), x << n)
+PTI_UW(right, _mm512_srl_epi32(x, _mm_cvtsi32_si128(n)), _mm256_srli_epi32(x, n), _mm_srli_epi32(x, n), x >> n)
+PTI_UW(sign, _mm512_srai_epi32(x, 31), _mm256_srai_epi32(x, 31), _mm_srai_epi32(x, 31), 0u - (x >> 31))
+PTI_INLINE pti_uw pti_uw_spread(pti_uw x) { return pti_uw_sign(x, x, 0); } /* the highest bit in all places */
+PTI_INLINE pti_uw pti_uw_add(pti_uw x, pti_uw y) { return pti_uw_sum(x, y, 0); }
+PTI_INLINE pti_uw pti_uw_mul(pti_uw x, pti_uw y) { return pti_uw_product(x, y, 0); }
+PTI_INLINE pti_uw pti_uw_xor(pti_uw x, pti_uw y) { return pti_uw_xor2(x, y, 0); }
+PTI_INLINE pti_uw pti_uw_or(pti_uw x, pti_uw y) { return pti_uw_or2(x, y, 0); }
+PTI_INLINE pti_uw pti_uw_and(pti_uw x, pti_uw y) { return pti_uw_and2(x, y, 0); }
+PTI_INLINE pti_uw pti_uw_shl(pti_uw x, int n) { return pti_uw_left(x, x, n); }
+PTI_INLINE pti_uw pti_uw_shr(pti_uw x, int n) { return pti_uw_right(x, x, n); }
+
+/* Lanes as numbers. */
+typedef union pti_lane_row {
+    pti_fw f;
+    pti_uw u;
+    float v[PTI_WIDTH];
+    uint32_t bits[PTI_WIDTH];
+} pti_lane_row;
+
+/* Words below 2^24 as floats, floats in [0, 2^24) as words, and table[index]. */
+#if PTI_WIDTH == 16
+PTI_INLINE pti_fw pti_fw_from_words(pti_uw x) { return _mm512_cvtepi32_ps(x); }
+PTI_INLINE pti_uw pti_uw_from_floats(pti_fw x) { return _mm512_cvttps_epi32(x); }
+PTI_INLINE pti_fw pti_fw_gather(const float *table, pti_uw index) { return _mm512_i32gather_ps(index, table, 4); }
+#elif PTI_LANES == 2
+PTI_INLINE pti_fw pti_fw_from_words(pti_uw x) { return _mm256_cvtepi32_ps(x); }
+PTI_INLINE pti_uw pti_uw_from_floats(pti_fw x) { return _mm256_cvttps_epi32(x); }
+PTI_INLINE pti_fw pti_fw_gather(const float *table, pti_uw index) { return _mm256_i32gather_ps(table, index, 4); }
+#else
+PTI_INLINE pti_fw pti_fw_from_words(pti_uw x)
+{
+    pti_lane_row r;
+    int i;
+    r.u = x;
+    for (i = 0; i < PTI_WIDTH; i++) r.v[i] = (float)(int32_t)r.bits[i];
+    return r.f;
+}
+PTI_INLINE pti_uw pti_uw_from_floats(pti_fw x)
+{
+    pti_lane_row r;
+    int i;
+    r.f = x;
+    for (i = 0; i < PTI_WIDTH; i++) r.bits[i] = (uint32_t)(int32_t)r.v[i];
+    return r.u;
+}
+PTI_INLINE pti_fw pti_fw_gather(const float *table, pti_uw index)
+{
+    pti_lane_row r;
+    int i;
+    r.u = index;
+    for (i = 0; i < PTI_WIDTH; i++) r.v[i] = table[r.bits[i]];
+    return r.f;
+}
+#endif
+
+/* Vectors, one in each lane. */
+typedef struct pti_w3 {
+    pti_fw x, y, z;
+} pti_w3;
+PTI_INLINE pti_w3 pti_w3_make(pti_fw x, pti_fw y, pti_fw z)
+{
+    pti_w3 r;
+    r.x = x;
+    r.y = y;
+    r.z = z;
+    return r;
+}
+PTI_INLINE pti_w3 pti_w3_sub(pti_w3 a, pti_w3 b) { return pti_w3_make(pti_fw_sub(a.x, b.x), pti_fw_sub(a.y, b.y), pti_fw_sub(a.z, b.z)); }
+PTI_INLINE pti_w3 pti_w3_scale(pti_w3 a, pti_fw k) { return pti_w3_make(pti_fw_mul(a.x, k), pti_fw_mul(a.y, k), pti_fw_mul(a.z, k)); }
+PTI_INLINE pti_w3 pti_w3_mul(pti_w3 a, pti_w3 b) { return pti_w3_make(pti_fw_mul(a.x, b.x), pti_fw_mul(a.y, b.y), pti_fw_mul(a.z, b.z)); }
+/* k d + o */
+PTI_INLINE pti_w3 pti_w3_along(pti_w3 d, pti_fw k, pti_w3 o)
+{
+    return pti_w3_make(pti_fw_madd(d.x, k, o.x), pti_fw_madd(d.y, k, o.y), pti_fw_madd(d.z, k, o.z));
+}
+/* a.b + c */
+PTI_INLINE pti_fw pti_w3_dot_add(pti_w3 a, pti_w3 b, pti_fw c)
+{
+    return pti_fw_madd(a.x, b.x, pti_fw_madd(a.y, b.y, pti_fw_madd(a.z, b.z, c)));
+}
+PTI_INLINE pti_fw pti_w3_dot(pti_w3 a, pti_w3 b) { return pti_fw_madd(a.x, b.x, pti_fw_madd(a.y, b.y, pti_fw_mul(a.z, b.z))); }
+PTI_INLINE pti_w3 pti_w3_select(pti_mw m, pti_w3 a, pti_w3 b)
+{
+    return pti_w3_make(pti_fw_select(m, a.x, b.x), pti_fw_select(m, a.y, b.y), pti_fw_select(m, a.z, b.z));
+}
+PTI_INLINE pti_w3 pti_w3_set(const float v[3]) { return pti_w3_make(pti_fw_set(v[0]), pti_fw_set(v[1]), pti_fw_set(v[2])); }
+PTI_INLINE pti_w3 pti_w3_normalize(pti_w3 a) { return pti_w3_scale(a, pti_fw_div(pti_fw_set(1), pti_fw_sqrt(pti_w3_dot(a, a)))); }
+
+/* sin and cos of x in [-pi/4, pi/4], by their series: off by less than 2^-24. */
+PTI_INLINE void pti_fw_sincos(pti_fw x, pti_fw *s, pti_fw *c)
+{
+    const pti_fw q = pti_fw_mul(x, x);
+    pti_fw p = pti_fw_madd(q, pti_fw_set(1 / 362880.f), pti_fw_set(-1 / 5040.f));
+    p = pti_fw_madd(q, p, pti_fw_set(1 / 120.f));
+    p = pti_fw_madd(q, p, pti_fw_set(-1 / 6.f));
+    *s = pti_fw_madd(pti_fw_mul(q, p), x, x);
+    p = pti_fw_madd(q, pti_fw_set(1 / 40320.f), pti_fw_set(-1 / 720.f));
+    p = pti_fw_madd(q, p, pti_fw_set(1 / 24.f));
+    p = pti_fw_madd(q, p, pti_fw_set(-0.5f));
+    *c = pti_fw_madd(q, p, pti_fw_set(1));
+}
+
+/* --- the scene, made ready --- */
+
+enum { PTI_LOCK_MAX = 64, PTI_LOCK_CLASSES = 6, PTI_LOCK_QUADS = 3, PTI_LOCK_TRIANGLES = 4, PTI_LOCK_SPHERES = 5 };
+
+/* What a lane looks up of the primitive it has hit, and of the light it has chosen. */
+enum {
+    PTI_OF_N, PTI_OF_D = 3,         /* flat: the plane n.p + d = 0 */
+    PTI_OF_CENTRE = 4, PTI_OF_DEPTH = 7, /* centroid and its distance to the nearest edge; centre of a sphere */
+    PTI_OF_RADIUS = 8,              /* 0: flat */
+    PTI_OF_ALBEDO = 9, PTI_OF_KIND = 12, PTI_OF_IOR = 13, PTI_OF_LIGHT = 14, PTI_OF_COUNT = 15
+};
+enum {
+    PTI_LIT_P, PTI_LIT_E1 = 3, PTI_LIT_E2 = 6, PTI_LIT_N = 9, /* corner, edges, normal; centre of a sphere   */
+    PTI_LIT_EMISSION = 12, PTI_LIT_DENSITY = 15, /* probability / area; sphere: probability                 */
+    PTI_LIT_RADIUS = 16, PTI_LIT_TRIANGLE = 17, PTI_LIT_COUNT = 18
+};
+
+typedef struct pti_lockstep {
+    /* classes 0, 1, 2: rectangles across x, y, z; parallelograms; triangles; spheres. Those of class c stand from begin[c] on,
+       first those that can block a shadow ray, up to blockers[c] */
+    int begin[PTI_LOCK_CLASSES + 1], blockers[PTI_LOCK_CLASSES];
+    float at[PTI_LOCK_MAX][16];     /* rectangle: place, then from, to along the next axis, and along the one after. Others: rows
+                                       x, y, z, 1 of the height above the plane and of the distances from edges: two, and
+                                       the distances of the opposite edges, or three. Sphere: centre, radius        */
+    float of[PTI_OF_COUNT][PTI_LOCK_MAX], light[PTI_LIT_COUNT][PTI_LOCK_MAX], chosen[PTI_LOCK_MAX];
+    int light_count, sphere_lights, specular; /* specular: some material is                                 */
+    float e, e_camera;              /* how far a computed point may be off its plane; the same for rays of the camera */
+} pti_lockstep;
+
+/* A primitive while the scene is being made ready: 0 (sphere), 3 or 4 corners. */
+typedef struct pti_lock_item {
+    pt_vec3 c[4];
+    double radius;
+    int corners, kind, material, light, twin; /* twin: the other triangle's light, or -1                    */
+    int blocks;
+} pti_lock_item;
+
+/* Across which axis is it a rectangle along the other two? -1: it is none. */
+static int pti_lock_axis(const pti_lock_item *q)
+{
+    const pti_d3 a = pti_d_between(q->c[0], q->c[1]), b = pti_d_between(q->c[0], q->c[3]);
+    const int none[3] = {a.x == 0 && b.x == 0, a.y == 0 && b.y == 0, a.z == 0 && b.z == 0};
+    if (q->corners != 4 || (a.x != 0) + (a.y != 0) + (a.z != 0) != 1 || (b.x != 0) + (b.y != 0) + (b.z != 0) != 1) return -1;
+    return none[0] ? 0 : none[1] ? 1 : none[2] ? 2 : -1;
+}
+
+/* Item from primitive i (and perhaps i + 1, which then is its other half); how many it takes. */
+static uint32_t pti_lock_collect(const pt_scene *scene, uint32_t i, double extent, pti_lock_item *q)
+{
+    const pt_primitive *p = &scene->primitives[i];
+    pt_vec3 other[4], all[4];
+    memset(q, 0, sizeof *q);
+    q->material = pti_primitive_material(scene, p);
+    q->light = p->light;
+    q->twin = -1;
+    if (p->shape == PT_SHAPE_SPHERE) {
+        q->c[0] = scene->spheres[p->index].centre;
+        q->radius = (double)scene->spheres[p->index].radius;
+        q->kind = PTI_LOCK_SPHERES;
+        return 1;
+    }
+    q->corners = pti_corners(scene, p, q->c);
+    if (q->corners == 3 && i + 1 < scene->primitive_count && p[1].shape == PT_SHAPE_TRIANGLE && pti_corners(scene, &p[1], other) == 3 &&
+        pti_primitive_material(scene, &p[1]) == q->material && pti_is_parallelogram(q->c, other, extent, all)) {
+        memcpy(q->c, all, sizeof all);
+        q->corners = 4;
+        q->twin = p[1].light;
+    }
+    q->kind = pti_lock_axis(q);
+    if (q->kind < 0) q->kind = q->corners == 4 ? PTI_LOCK_QUADS : PTI_LOCK_TRIANGLES;
+    return q->corners == 4 && p->shape == PT_SHAPE_TRIANGLE ? 2 : 1;
+}
+
+static pti_d3 pti_lock_normal(const pti_lock_item *q)
+{
+    return pti_d_normalize(pti_d_cross(pti_d_between(q->c[0], q->c[1]), pti_d_between(q->c[0], q->c[q->corners - 1])));
+}
+
+/* Can it come between two points of the scene's surfaces? Not a plane with all of them on one side of it. */
+static int pti_lock_blocks(const pti_lock_item *q, const pti_lock_item *all, int count, double e)
+{
+    double low = 0, high = 0;
+    pti_d3 n;
+    int i, k;
+    if (q->corners == 0) return 1;
+    n = pti_lock_normal(q);
+    for (i = 0; i < count; i++)
+        for (k = 0; k < (all[i].corners ? all[i].corners : 1); k++) {
+            const double h = pti_d_dot(n, pti_d_between(q->c[0], all[i].c[k]));
+            low = fmin(low, h - all[i].radius);
+            high = fmax(high, h + all[i].radius);
+        }
+    return low < -e && high > e;
+}
+
+/* row: x, y, z, 1 of the distance of a point from the line through a along t, in the plane across n (unit). */
+static void pti_lock_row(float *row, pti_d3 n, pti_d3 t, pt_vec3 a)
+{
+    const pti_d3 s = pti_d_normalize(pti_d_cross(n, t));
+    row[0] = (float)s.x;
+    row[1] = (float)s.y;
+    row[2] = (float)s.z;
+    row[3] = (float)-pti_d_dot(s, pti_d_from(a));
+}
+
+/* Writes what is tested; the distance of the centroid from the nearest edge. */
+static double pti_lock_write_flat(const pti_lock_item *q, float *at)
+{
+    const int b = (q->kind + 1) % 3, c = (q->kind + 2) % 3;
+    const pti_d3 n = pti_lock_normal(q);
+    double depth = HUGE_VAL;
+    pti_d3 middle = pti_d(0, 0, 0);
+    int i, k;
+    for (i = 0; i < q->corners; i++) middle = pti_d_add(middle, pti_d_scale(pti_d_from(q->c[i]), 1.0 / q->corners));
+    for (i = 0; i < q->corners; i++) {
+        const pti_d3 t = pti_d_between(q->c[i], q->c[(i + 1) % q->corners]);
+        const double d = pti_d_dot(pti_d_normalize(pti_d_cross(n, t)), pti_d_sub(middle, pti_d_from(q->c[i])));
+        depth = fmin(depth, d);
+        if (q->kind == PTI_LOCK_QUADS && i != 0 && i != 3) continue;
+        if (q->kind >= PTI_LOCK_QUADS) pti_lock_row(at + (i == 0 ? 4 : q->corners == 4 ? 8 : 4 + 4 * i), n, t, q->c[i]);
+        if (q->kind == PTI_LOCK_QUADS) at[i == 0 ? 12 : 13] = (float)(2 * d);
+    }
+    if (q->kind >= PTI_LOCK_QUADS) {
+        at[0] = (float)n.x;
+        at[1] = (float)n.y;
+        at[2] = (float)n.z;
+        at[3] = (float)-pti_d_dot(n, pti_d_from(q->c[0]));
+        return depth;
+    }
+    at[0] = (float)pti_along(&q->c[0], q->kind);
+    for (k = 0; k < 2; k++) {
+        const float x = (float)pti_along(&q->c[0], k ? c : b), y = (float)pti_along(&q->c[2], k ? c : b);
+        at[1 + 2 * k] = x < y ? x : y;
+        at[2 + 2 * k] = x < y ? y : x;
+    }
+    return depth;
+}
+
+static void pti_lock_put(float (*table)[PTI_LOCK_MAX], int row, int i, pti_d3 v)
+{
+    table[row][i] = (float)v.x;
+    table[row + 1][i] = (float)v.y;
+    table[row + 2][i] = (float)v.z;
+}
+
+/* A light of one item; its probability is a multiple of 2^-24, as the number that chooses is. */
+static void pti_lock_write_light(pti_lockstep *k, const pt_scene *scene, const pti_lock_item *q, pti_d3 n, double *sum)
+{
+    const pt_material *m = &scene->materials[q->material];
+    const int i = k->light_count++;
+    const double before = floor(*sum * 16777216 + 0.5) / 16777216;
+    double area = scene->lights[q->light].area, pmf = scene->lights[q->light].pmf;
+    if (q->twin >= 0) {
+        area += scene->lights[q->twin].area;
+        pmf += scene->lights[q->twin].pmf;
+    }
+    *sum += pmf;
+    pmf = floor(*sum * 16777216 + 0.5) / 16777216 - before;
+    k->chosen[i] = (float)before;
+    pti_lock_put(k->light, PTI_LIT_P, i, pti_d_from(q->c[0]));
+    pti_lock_put(k->light, PTI_LIT_E1, i, pti_d_between(q->c[0], q->c[1]));
+    pti_lock_put(k->light, PTI_LIT_E2, i, q->corners ? pti_d_between(q->c[0], q->c[q->corners - 1]) : pti_d(0, 0, 0));
+    pti_lock_put(k->light, PTI_LIT_N, i, n);
+    pti_lock_put(k->light, PTI_LIT_EMISSION, i, pti_d((double)m->emission.r, (double)m->emission.g, (double)m->emission.b));
+    k->light[PTI_LIT_DENSITY][i] = (float)(q->corners ? pmf / area : pmf);
+    k->light[PTI_LIT_RADIUS][i] = (float)q->radius;
+    k->light[PTI_LIT_TRIANGLE][i] = q->corners == 3;
+    k->sphere_lights += q->corners == 0;
+}
+
+/* Writes item q as number i; returns its smallest measure. */
+static double pti_lock_write(pti_lockstep *k, const pt_scene *scene, const pti_lock_item *q, int i, double *sum)
+{
+    const pt_material *m = &scene->materials[q->material];
+    pti_d3 n = pti_d(0, 0, 0), middle = pti_d_from(q->c[0]);
+    double depth = q->radius;
+    if (q->corners) {
+        n = pti_lock_normal(q);
+        depth = pti_lock_write_flat(q, k->at[i]);
+        middle = pti_d_scale(pti_d_add(middle, pti_d_from(q->c[2])), 0.5);
+        if (q->corners == 3) middle = pti_d_scale(pti_d_add(pti_d_from(q->c[0]), pti_d_add(pti_d_from(q->c[1]), pti_d_from(q->c[2]))), 1 / 3.0);
+    } else {
+        k->at[i][0] = (float)q->c[0].x;
+        k->at[i][1] = (float)q->c[0].y;
+        k->at[i][2] = (float)q->c[0].z;
+        k->at[i][3] = (float)q->radius;
+    }
+    pti_lock_put(k->of, PTI_OF_N, i, n);
+    k->of[PTI_OF_D][i] = (float)-pti_d_dot(n, pti_d_from(q->c[0]));
+    pti_lock_put(k->of, PTI_OF_CENTRE, i, middle);
+    k->of[PTI_OF_DEPTH][i] = (float)depth;
+    k->of[PTI_OF_RADIUS][i] = (float)q->radius;
+    pti_lock_put(k->of, PTI_OF_ALBEDO, i, pti_d((double)m->albedo.r, (double)m->albedo.g, (double)m->albedo.b));
+    k->of[PTI_OF_KIND][i] = (float)m->kind;
+    k->of[PTI_OF_IOR][i] = (float)pti_ior(m);
+    k->of[PTI_OF_LIGHT][i] = -1;
+    k->specular |= m->kind != PT_MATERIAL_DIFFUSE;
+    if (q->light >= 0) {
+        k->of[PTI_OF_LIGHT][i] = (float)k->light_count;
+        pti_lock_write_light(k, scene, q, n, sum);
+    }
+    return depth;
+}
+
+/* Makes a scene ready; 0: it is not one for lanes, or not seen from such a place. With u = 2^-24 and all coordinates at
+   most x, the height n.p + d of a point is computed with an error of 3 roundings of at most 3.5 x each, putting the
+   point back on the plane rounds its coordinates once (1.8 u x), and a plane is off its corners by the roundings of n
+   and d (4.4 u x): all together below 17 u x = e. */
+static int pti_lockstep_make(pti_lockstep *k, const pt_scene *scene, pt_vec3 eye)
+{
+    const unsigned taken = PT_NEEDS_TRIANGLES | PT_NEEDS_PARALLELOGRAMS | PT_NEEDS_SPHERES | PT_NEEDS_DIFFUSE | PT_NEEDS_MIRROR |
+                           PT_NEEDS_DIELECTRIC | PT_NEEDS_UVS | PT_NEEDS_AREA_LIGHTS;
+    const double x = fmax(pti_max3((double)scene->lo.x, (double)scene->lo.y, (double)scene->lo.z),
+                          pti_max3((double)scene->hi.x, (double)scene->hi.y, (double)scene->hi.z));
+    const double from = fmax(x, pti_max3((double)eye.x, (double)eye.y, (double)eye.z));
+    pti_lock_item items[PTI_LOCK_MAX];
+    double smallest = HUGE_VAL, sum = 0;
+    uint32_t i;
+    int count = 0, n = 0, kind, j, blocks;
+    if ((scene->needs & ~taken) || scene->primitive_count < 1 || scene->primitive_count > PTI_LOCK_MAX) return 0;
+    memset(k, 0, sizeof *k);
+    k->e = (float)(17 * PTI_2_M24 * x);
+    k->e_camera = (float)(17 * PTI_2_M24 * from);
+    for (i = 0; i < scene->primitive_count; count++) i += pti_lock_collect(scene, i, x, &items[count]);
+    for (j = 0; j < count; j++) items[j].blocks = pti_lock_blocks(&items[j], items, count, (double)k->e);
+    for (kind = 0; kind < PTI_LOCK_CLASSES; kind++) {
+        k->begin[kind] = n;
+        for (blocks = 1; blocks >= 0; blocks--) {
+            for (j = 0; j < count; j++)
+                if (items[j].kind == kind && items[j].blocks == blocks) smallest = fmin(smallest, pti_lock_write(k, scene, &items[j], n++, &sum));
+            if (blocks) k->blockers[kind] = n;
+        }
+    }
+    k->begin[PTI_LOCK_CLASSES] = n;
+    for (j = 0; j < k->light_count; j++)
+        if (!(k->light[PTI_LIT_DENSITY][j] > 0)) return 0; /* too dim for 24 bits */
+    return smallest > 2048 * (double)k->e && smallest > 64 * (double)k->e_camera && (double)k->e > 1e-30 && x < 1e15;
+}
+
+/* --- rays --- */
+
+#define PTI_LOCK_FAR 3e38f
+
+/* The nearest hit of a ray in each lane so far. */
+typedef struct pti_lock_best {
+    pti_fw t, i, margin;    /* distance, number of the primitive, distance to its nearest edge              */
+} pti_lock_best;
+
+/* A primitive that is met at t, `margin` inside its edges. any: only whether, and whether before the end */
+PTI_INLINE pti_mw pti_lock_keep(pti_lock_best *best, pti_fw t, pti_fw margin, pti_fw slack, int i, const int any)
+{
+    const pti_fw zero = pti_fw_set(0);
+    const pti_mw met = pti_mw_and(pti_mw_and(pti_fw_lt(zero, t), pti_fw_lt(t, best->t)), pti_fw_le(zero, pti_fw_add(margin, slack)));
+    if (any) return met;
+    best->t = pti_fw_select(met, t, best->t);
+    best->i = pti_fw_select(met, pti_fw_set((float)i), best->i);
+    best->margin = pti_fw_select(met, margin, best->margin);
+    return met;
+}
+
+/* Rectangles across axis `kind`, whose coordinates are o.x, d.x after a turn of the axes. */
+PTI_INLINE pti_mw pti_lock_rectangles(const pti_lockstep *k, int kind, pti_w3 o, pti_w3 d, float e, pti_lock_best *best, pti_mw met, const int any)
+{
+    const pti_fw inverse = pti_fw_div(pti_fw_set(1), d.x), slack = pti_fw_mul(pti_fw_abs(inverse), pti_fw_set(2 * e));
+    const int end = any ? k->blockers[kind] : k->begin[kind + 1];
+    int i;
+    for (i = k->begin[kind]; i < end; i++) {
+        const float *at = k->at[i];
+        const pti_fw t = pti_fw_mul(pti_fw_sub(pti_fw_set(at[0]), o.x), inverse);
+        const pti_fw y = pti_fw_madd(t, d.y, o.y), z = pti_fw_madd(t, d.z, o.z);
+        const pti_fw my = pti_fw_min(pti_fw_sub(y, pti_fw_set(at[1])), pti_fw_sub(pti_fw_set(at[2]), y));
+        const pti_fw mz = pti_fw_min(pti_fw_sub(z, pti_fw_set(at[3])), pti_fw_sub(pti_fw_set(at[4]), z));
+        const pti_mw hit = pti_lock_keep(best, t, pti_fw_min(my, mz), slack, i, any);
+        if (any) met = pti_mw_or(met, hit);
+    }
+    return met;
+}
+
+PTI_INLINE pti_fw pti_lock_height(const float *row, pti_w3 p)
+{
+    return pti_w3_dot_add(pti_w3_set(row), p, pti_fw_set(row[3]));
+}
+
+PTI_INLINE pti_mw pti_lock_flats(const pti_lockstep *k, int kind, pti_w3 o, pti_w3 d, float e, pti_lock_best *best, pti_mw met, const int any)
+{
+    const int end = any ? k->blockers[kind] : k->begin[kind + 1];
+    int i;
+    for (i = k->begin[kind]; i < end; i++) {
+        const float *at = k->at[i];
+        const pti_fw inverse = pti_fw_div(pti_fw_set(-1), pti_w3_dot(pti_w3_set(at), d));
+        const pti_fw t = pti_fw_mul(pti_lock_height(at, o), inverse);
+        const pti_w3 p = pti_w3_along(d, t, o);
+        const pti_fw u = pti_lock_height(at + 4, p), v = pti_lock_height(at + 8, p);
+        pti_fw margin = pti_fw_min(u, v);
+        pti_mw hit;
+        if (kind == PTI_LOCK_TRIANGLES) margin = pti_fw_min(margin, pti_lock_height(at + 12, p));
+        else margin = pti_fw_min(margin, pti_fw_min(pti_fw_sub(pti_fw_set(at[12]), u), pti_fw_sub(pti_fw_set(at[13]), v)));
+        hit = pti_lock_keep(best, t, margin, pti_fw_mul(pti_fw_abs(inverse), pti_fw_set(2 * e)), i, any);
+        if (any) met = pti_mw_or(met, hit);
+    }
+    return met;
+}
+
+/* As pti_sphere does it, for d of length 1. */
+PTI_INLINE pti_mw pti_lock_balls(const pti_lockstep *k, pti_w3 o, pti_w3 d, pti_lock_best *best, pti_mw met, const int any)
+{
+    const pti_fw zero = pti_fw_set(0);
+    int i;
+    for (i = k->begin[PTI_LOCK_SPHERES]; i < k->begin[PTI_LOCK_CLASSES]; i++) {
+        const pti_w3 f = pti_w3_sub(o, pti_w3_set(k->at[i]));
+        const pti_fw r = pti_fw_set(k->at[i][3]), b = pti_fw_sub(zero, pti_w3_dot(f, d)), far = pti_fw_sqrt(pti_w3_dot(f, f));
+        const pti_w3 foot = pti_w3_along(d, b, f);
+        const pti_fw l = pti_fw_sqrt(pti_w3_dot(foot, foot)), square = pti_fw_mul(pti_fw_sub(r, l), pti_fw_add(r, l));
+        const pti_fw root = pti_fw_sqrt(pti_fw_max(square, zero)), c = pti_fw_mul(pti_fw_sub(far, r), pti_fw_add(far, r));
+        const pti_fw q = pti_fw_select(pti_fw_lt(b, zero), pti_fw_sub(b, root), pti_fw_add(b, root)), t0 = pti_fw_div(c, q);
+        const pti_fw first = pti_fw_min(t0, q), t = pti_fw_select(pti_fw_lt(zero, first), first, pti_fw_max(t0, q));
+        const pti_fw margin = pti_fw_select(pti_fw_lt(square, zero), pti_fw_set(-1), pti_fw_set(PTI_LOCK_FAR));
+        const pti_mw hit = pti_lock_keep(best, t, margin, zero, i, any);
+        if (any) met = pti_mw_or(met, hit);
+    }
+    return met;
+}
+
+/* All primitives against a ray in each lane, d of length 1. any: those that can block, before best->t. */
+PTI_INLINE pti_mw pti_lock_ask(const pti_lockstep *k, pti_w3 o, pti_w3 d, float e, pti_lock_best *best, const int any)
+{
+    pti_mw met = pti_mw_of_bits(0);
+    if (k->begin[1] > k->begin[0]) met = pti_lock_rectangles(k, 0, o, d, e, best, met, any);
+    if (k->begin[2] > k->begin[1])
+        met = pti_lock_rectangles(k, 1, pti_w3_make(o.y, o.z, o.x), pti_w3_make(d.y, d.z, d.x), e, best, met, any);
+    if (k->begin[3] > k->begin[2])
+        met = pti_lock_rectangles(k, 2, pti_w3_make(o.z, o.x, o.y), pti_w3_make(d.z, d.x, d.y), e, best, met, any);
+    met = pti_lock_flats(k, PTI_LOCK_QUADS, o, d, e, best, met, any);
+    met = pti_lock_flats(k, PTI_LOCK_TRIANGLES, o, d, e, best, met, any);
+    return pti_lock_balls(k, o, d, best, met, any);
+}
+
+/* --- numbers --- */
+
+/* xoroshiro64* [Bla21]: a + b -> 24 bits of each lane as a float in [0,1). */
+PTI_INLINE pti_fw pti_lock_next(pti_uw *a, pti_uw *b)
+{
+    const pti_uw r = pti_uw_mul(*a, pti_uw_set(0x9e3779bbu)), x = pti_uw_xor(*a, *b);
+    *a = pti_uw_xor(pti_uw_xor(pti_uw_or(pti_uw_shl(*a, 26), pti_uw_shr(*a, 6)), x), pti_uw_shl(x, 9));
+    *b = pti_uw_or(pti_uw_shl(x, 13), pti_uw_shr(x, 19));
+    return pti_fw_mul(pti_fw_from_words(pti_uw_shr(r, 8)), pti_fw_set((float)PTI_2_M24));
+}
+
+PTI_INLINE pti_uw pti_lock_masked(pti_uw x, int n, uint32_t mask) /* the bits of both, n apart, exchanged */
+{
+    const pti_uw m = pti_uw_set(mask);
+    return pti_uw_or(pti_uw_shl(pti_uw_and(x, m), n), pti_uw_and(pti_uw_shr(x, n), m));
+}
+PTI_INLINE pti_uw pti_lock_reverse(pti_uw x)
+{
+    x = pti_uw_or(pti_uw_shl(x, 16), pti_uw_shr(x, 16));
+    x = pti_lock_masked(x, 8, 0x00ff00ffu);
+    x = pti_lock_masked(x, 4, 0x0f0f0f0fu);
+    x = pti_lock_masked(x, 2, 0x33333333u);
+    return pti_lock_masked(x, 1, 0x55555555u);
+}
+
+/* pti_laine_karras and pti_sobol_reversed in lanes. */
+PTI_INLINE pti_uw pti_lock_scramble(pti_uw x, pti_uw seed)
+{
+    x = pti_uw_xor(x, pti_uw_mul(x, pti_uw_set(0x3d20adeau)));
+    x = pti_uw_add(x, seed);
+    x = pti_uw_mul(x, pti_uw_or(pti_uw_shr(seed, 16), pti_uw_set(1)));
+    x = pti_uw_xor(x, pti_uw_mul(x, pti_uw_set(0x05526c56u)));
+    return pti_uw_xor(x, pti_uw_mul(x, pti_uw_set(0x53a22864u)));
+}
+static pti_uw pti_lock_sobol(pti_uw n, int d)
+{
+    static const int shift[5] = {1, 2, 4, 8, 16};
+    static const uint32_t mask[5] = {0x55555555u, 0x33333333u, 0x0f0f0f0fu, 0x00ff00ffu, 0x0000ffffu};
+    pti_uw x = pti_uw_set(0);
+    int i;
+    if (d == 0) return n;
+    if (d == 1) {
+        for (i = 0; i < 5; i++) n = pti_uw_xor(n, pti_uw_and(pti_uw_shr(n, shift[i]), pti_uw_set(mask[i])));
+        return n;
+    }
+    for (i = 0; i < 32; i++) { /* the bit, all over the word, chooses */
+        const pti_uw bit = pti_uw_spread(pti_uw_shl(n, 31 - i));
+        x = pti_uw_xor(x, pti_uw_and(bit, pti_uw_set(pti_sobol_columns[d - 2][i])));
+    }
+    return x;
+}
+
+/* --- paths --- */
+
+/* The state of a path, a row of lanes each. Density < 0: the last direction came from a delta lobe, or the camera. */
+enum {
+    PTI_ROW_O, PTI_ROW_D = 3, PTI_ROW_BETA = 6, PTI_ROW_SUM = 9, PTI_ROW_DENSITY = 12, PTI_ROW_ETA2, PTI_ROW_A, PTI_ROW_B,
+    PTI_ROW_SLOT, PTI_ROW_EDGES, PTI_ROWS
+};
+
+/* The decisions of one vertex. */
+typedef struct pti_lock_numbers {
+    pti_fw which, light0, light1, bsdf0, bsdf1, lobe;
+} pti_lock_numbers;
+
+/* What is hit. */
+typedef struct pti_lock_surface {
+    pti_uw i;
+    pti_w3 p, n;            /* point, and normal on the side that the path came from                       */
+    pti_fw cosine;          /* of the ray and that normal                                                  */
+    pti_mw met, front, ball; /* anything at all; from the side of ng; a sphere                             */
+    pti_fw kind;
+} pti_lock_surface;
+
+PTI_INLINE pti_w3 pti_row3(const pti_lane_row *row) { return pti_w3_make(row[0].f, row[1].f, row[2].f); }
+PTI_INLINE void pti_row3_set(pti_lane_row *row, pti_w3 v)
+{
+    row[0].f = v.x;
+    row[1].f = v.y;
+    row[2].f = v.z;
+}
+PTI_INLINE pti_w3 pti_gather3(const float (*table)[PTI_LOCK_MAX], int row, pti_uw i)
+{
+    return pti_w3_make(pti_fw_gather(table[row], i), pti_fw_gather(table[row + 1], i), pti_fw_gather(table[row + 2], i));
+}
+
+/* The point at t, put back on its surface and away from its edges. */
+PTI_INLINE void pti_lock_land(const pti_lockstep *k, pti_w3 o, pti_w3 d, const pti_lock_best *best, pti_lock_surface *s)
+{
+    const pti_fw zero = pti_fw_set(0), inset = pti_fw_set(16 * k->e);
+    pti_w3 n;
+    s->i = pti_uw_from_floats(best->i);
+    s->p = pti_w3_along(d, best->t, o);
+    n = pti_gather3(k->of, PTI_OF_N, s->i);
+    s->p = pti_w3_along(n, pti_fw_sub(zero, pti_w3_dot_add(n, s->p, pti_fw_gather(k->of[PTI_OF_D], s->i))), s->p);
+    if (pti_mw_bits(pti_fw_lt(best->margin, inset))) {
+        const pti_fw depth = pti_fw_gather(k->of[PTI_OF_DEPTH], s->i);
+        const pti_fw share = pti_fw_max(zero, pti_fw_div(pti_fw_sub(inset, best->margin), pti_fw_sub(depth, best->margin)));
+        s->p = pti_w3_along(pti_w3_sub(pti_gather3(k->of, PTI_OF_CENTRE, s->i), s->p), share, s->p);
+    }
+    s->ball = pti_fw_lt(pti_fw_set(1e38f), best->margin);
+    if (pti_mw_bits(s->ball)) { /* n = 0 for spheres, so p is as it was */
+        const pti_w3 centre = pti_gather3(k->of, PTI_OF_CENTRE, s->i), out = pti_w3_normalize(pti_w3_sub(s->p, centre));
+        n = pti_w3_select(s->ball, out, n);
+        s->p = pti_w3_select(s->ball, pti_w3_along(out, pti_fw_gather(k->of[PTI_OF_RADIUS], s->i), centre), s->p);
+    }
+    s->cosine = pti_w3_dot(n, d);
+    s->front = pti_fw_lt(s->cosine, zero);
+    s->cosine = pti_fw_abs(s->cosine);
+    s->n = pti_w3_select(s->front, n, pti_w3_scale(n, pti_fw_set(-1)));
+    s->kind = k->specular ? pti_fw_gather(k->of[PTI_OF_KIND], s->i) : pti_fw_set((float)PT_MATERIAL_DIFFUSE);
+}
+
+PTI_INLINE pti_mw pti_lock_is(const pti_lock_surface *s, pt_material_kind kind)
+{
+    const pti_fw x = pti_fw_set((float)kind);
+    return pti_mw_and(pti_fw_le(s->kind, x), pti_fw_le(x, s->kind));
+}
+
+/* pt_mis_weight in lanes. */
+PTI_INLINE pti_fw pti_lock_weight(pti_fw p, pti_fw q, pt_heuristic heuristic)
+{
+    const pti_fw one = pti_fw_set(1), ratio = pti_fw_div(q, p);
+    if (heuristic == PT_HEURISTIC_BALANCE) return pti_fw_div(one, pti_fw_add(one, ratio));
+    if (heuristic == PT_HEURISTIC_MAXIMUM)
+        return pti_fw_select(pti_fw_lt(q, p), one, pti_fw_select(pti_fw_le(q, p), pti_fw_set(0.5f), pti_fw_set(0)));
+    return pti_fw_div(one, pti_fw_madd(ratio, ratio, one));
+}
+
+/* 1 - cos of the cone under which spheres are seen from d2 away, squared; 2 where p is inside. */
+PTI_INLINE pti_fw pti_lock_cone(pti_fw radius, pti_fw d2)
+{
+    const pti_fw s2 = pti_fw_div(pti_fw_mul(radius, radius), d2), one = pti_fw_set(1);
+    const pti_fw omc = pti_fw_div(s2, pti_fw_add(one, pti_fw_sqrt(pti_fw_max(pti_fw_set(0), pti_fw_sub(one, s2)))));
+    return pti_fw_select(pti_fw_lt(s2, one), omc, pti_fw_set(2));
+}
+
+/* Adds the emission of what is hit, weighted. */
+PTI_INLINE void pti_lock_emission(const pti_lockstep *k, const pti_lock_surface *s, const pti_lock_best *best, pti_lane_row *row,
+                                  int technique, pt_heuristic heuristic)
+{
+    const pti_fw zero = pti_fw_set(0), one = pti_fw_set(1), q = row[PTI_ROW_DENSITY].f;
+    const pti_fw number = pti_fw_gather(k->of[PTI_OF_LIGHT], s->i);
+    const pti_mw lit = pti_mw_and(s->met, pti_mw_and(pti_fw_le(zero, number), pti_mw_or(s->front, s->ball)));
+    const pti_mw delta = pti_fw_lt(q, zero);
+    pti_uw light;
+    pti_w3 value;
+    pti_fw p, weight = one;
+    if (!pti_mw_bits(lit)) return;
+    light = pti_uw_from_floats(pti_fw_max(zero, number));
+    value = pti_w3_mul(pti_row3(row + PTI_ROW_BETA), pti_gather3(k->light, PTI_LIT_EMISSION, light));
+    if (technique != PTI_TECHNIQUE_PLAIN) {
+        const pti_fw density = pti_fw_gather(k->light[PTI_LIT_DENSITY], light);
+        p = pti_fw_div(pti_fw_mul(density, pti_fw_mul(best->t, best->t)), s->cosine);
+        if (k->sphere_lights && pti_mw_bits(pti_mw_and(lit, s->ball))) {
+            const pti_w3 c = pti_w3_sub(pti_gather3(k->light, PTI_LIT_P, light), pti_row3(row + PTI_ROW_O));
+            const pti_fw omc = pti_lock_cone(pti_fw_gather(k->light[PTI_LIT_RADIUS], light), pti_w3_dot(c, c));
+            p = pti_fw_select(s->ball, pti_fw_div(density, pti_fw_mul(pti_fw_set((float)(2 * PT_PI)), omc)), p);
+        }
+        weight = technique == PTI_TECHNIQUE_LIGHT ? zero : pti_lock_weight(q, p, heuristic);
+        weight = pti_fw_select(delta, one, weight);
+    }
+    weight = pti_fw_select(lit, weight, zero);
+    pti_row3_set(row + PTI_ROW_SUM, pti_w3_along(value, weight, pti_row3(row + PTI_ROW_SUM)));
+}
+
+/* The two unit vectors that make a frame with n [Duf17]. */
+PTI_INLINE void pti_lock_frame(pti_w3 n, pti_w3 *s, pti_w3 *t)
+{
+    const pti_fw zero = pti_fw_set(0), one = pti_fw_set(1), sign = pti_fw_select(pti_fw_lt(n.z, zero), pti_fw_set(-1), one);
+    const pti_fw a = pti_fw_div(pti_fw_set(-1), pti_fw_add(sign, n.z)), b = pti_fw_mul(pti_fw_mul(n.x, n.y), a);
+    const pti_fw sx = pti_fw_mul(sign, n.x);
+    *s = pti_w3_make(pti_fw_madd(pti_fw_mul(sx, n.x), a, one), pti_fw_mul(sign, b), pti_fw_sub(zero, sx));
+    *t = pti_w3_make(b, pti_fw_madd(pti_fw_mul(n.y, n.y), a, sign), pti_fw_sub(zero, n.y));
+}
+
+/* cos and sin of 2 pi u: twice the double angle of a quarter. */
+PTI_INLINE void pti_lock_turn(pti_fw u, pti_fw *c, pti_fw *s)
+{
+    pti_fw x, y;
+    int i;
+    pti_fw_sincos(pti_fw_mul(pti_fw_sub(u, pti_fw_set(0.5f)), pti_fw_set((float)(PT_PI / 2))), &y, &x);
+    for (i = 0; i < 2; i++) {
+        const pti_fw twice = pti_fw_add(y, y);
+        y = pti_fw_mul(twice, x);
+        x = pti_fw_nmadd(twice, pti_fw_mul(pti_fw_set(0.5f), twice), pti_fw_set(1));
+    }
+    *c = pti_fw_sub(pti_fw_set(0), x); /* a half turn was taken off u */
+    *s = pti_fw_sub(pti_fw_set(0), y);
+}
+
+/* What is known of the lights chosen; one light is the same for all lanes. */
+PTI_INLINE pti_fw pti_lit(const pti_lockstep *k, int row, pti_uw light)
+{
+    return k->light_count == 1 ? pti_fw_set(k->light[row][0]) : pti_fw_gather(k->light[row], light);
+}
+PTI_INLINE pti_w3 pti_lit3(const pti_lockstep *k, int row, pti_uw light)
+{
+    return pti_w3_make(pti_lit(k, row, light), pti_lit(k, row + 1, light), pti_lit(k, row + 2, light));
+}
+
+/* A point of spheres: in the cone seen from p, or, from inside, in any direction. *q: the point, moved 2 e off to the side
+   of p; density per solid angle. */
+PTI_INLINE pti_fw pti_lock_ball_point(const pti_lockstep *k, pti_uw light, pti_w3 p, const pti_lock_numbers *u, pti_w3 *q)
+{
+    const pti_fw zero = pti_fw_set(0), one = pti_fw_set(1), r = pti_lit(k, PTI_LIT_RADIUS, light);
+    const pti_w3 centre = pti_lit3(k, PTI_LIT_P, light), c = pti_w3_sub(centre, p);
+    const pti_fw d2 = pti_w3_dot(c, c), d = pti_fw_sqrt(d2), omc = pti_lock_cone(r, d2);
+    const pti_mw inside = pti_fw_le(pti_fw_set(2), omc);
+    const pti_fw x = pti_fw_mul(u->light0, omc), sine2 = pti_fw_mul(x, pti_fw_sub(pti_fw_set(2), x)), sine = pti_fw_sqrt(sine2);
+    const pti_fw rest = pti_fw_sqrt(pti_fw_max(zero, pti_fw_nmadd(d2, sine2, pti_fw_mul(r, r))));
+    const pti_fw middle = pti_fw_mul(d, pti_fw_sub(one, x)); /* of the chord */
+    const pti_fw t = pti_fw_select(inside, pti_fw_add(middle, rest), pti_fw_sub(middle, rest));
+    pti_w3 axis = pti_w3_scale(c, pti_fw_div(one, d)), s, v, w;
+    pti_fw cosine, sinus;
+    axis = pti_w3_select(pti_fw_lt(zero, d), axis, pti_w3_make(zero, zero, one));
+    pti_lock_frame(axis, &s, &v);
+    pti_lock_turn(u->light1, &cosine, &sinus);
+    w = pti_w3_along(s, pti_fw_mul(sine, cosine), pti_w3_along(v, pti_fw_mul(sine, sinus), pti_w3_scale(axis, pti_fw_sub(one, x))));
+    w = pti_w3_normalize(pti_w3_sub(pti_w3_along(w, t, p), centre));
+    *q = pti_w3_along(w, pti_fw_add(r, pti_fw_select(inside, pti_fw_set(-2 * k->e), pti_fw_set(2 * k->e))), centre);
+    return pti_fw_div(pti_lit(k, PTI_LIT_DENSITY, light), pti_fw_mul(pti_fw_set((float)(2 * PT_PI)), omc));
+}
+
+/* A point of a flat light, moved 2 e off its front; density per area. */
+PTI_INLINE pti_fw pti_lock_flat_point(const pti_lockstep *k, pti_uw light, const pti_lock_numbers *u, pti_w3 *q, pti_w3 *n)
+{
+    const pti_fw triangle = pti_lit(k, PTI_LIT_TRIANGLE, light), root = pti_fw_sqrt(u->light0);
+    const pti_mw is_triangle = pti_fw_lt(pti_fw_set(0), triangle);
+    const pti_fw a = pti_fw_select(is_triangle, pti_fw_nmadd(root, u->light1, root), u->light0);
+    const pti_fw b = pti_fw_select(is_triangle, pti_fw_mul(root, u->light1), u->light1);
+    *n = pti_lit3(k, PTI_LIT_N, light);
+    *q = pti_w3_along(*n, pti_fw_set(2 * k->e), pti_lit3(k, PTI_LIT_P, light));
+    *q = pti_w3_along(pti_lit3(k, PTI_LIT_E1, light), a, *q);
+    *q = pti_w3_along(pti_lit3(k, PTI_LIT_E2, light), b, *q);
+    return pti_lit(k, PTI_LIT_DENSITY, light);
+}
+
+/* Asks a point of a light for its light; how many rays that took. */
+PTI_INLINE int pti_lock_direct(const pti_lockstep *k, const pti_lock_surface *s, pti_w3 albedo, pti_mw active, const pti_lock_numbers *u,
+                               pti_lane_row *row, int technique, pt_heuristic heuristic)
+{
+    const pti_fw zero = pti_fw_set(0), inverse_pi = pti_fw_set((float)(1 / PT_PI));
+    const pti_w3 o = pti_w3_along(s->n, pti_fw_set(2 * k->e), s->p);
+    pti_fw number = zero, density, distance2, distance, here, there, p, weight;
+    pti_w3 q, n, w;
+    pti_mw flat = pti_mw_of_bits(~0u);
+    pti_lock_best end;
+    pti_uw light;
+    int i, rays = 0;
+    for (i = 1; i < k->light_count; i++) number = pti_fw_select(pti_fw_le(pti_fw_set(k->chosen[i]), u->which), pti_fw_set((float)i), number);
+    light = pti_uw_from_floats(number);
+    density = pti_lock_flat_point(k, light, u, &q, &n);
+    if (k->sphere_lights) {
+        pti_w3 ball;
+        const pti_fw per_angle = pti_lock_ball_point(k, light, s->p, u, &ball);
+        flat = pti_fw_le(pti_lit(k, PTI_LIT_RADIUS, light), zero);
+        q = pti_w3_select(flat, q, ball);
+        density = pti_fw_select(flat, density, per_angle);
+    }
+    w = pti_w3_sub(q, o);
+    distance2 = pti_w3_dot(w, w);
+    distance = pti_fw_sqrt(distance2);
+    w = pti_w3_scale(w, pti_fw_div(pti_fw_set(1), distance));
+    here = pti_w3_dot(s->n, w);
+    there = pti_fw_sub(zero, pti_w3_dot(n, w));
+    p = pti_fw_select(flat, pti_fw_div(pti_fw_mul(density, distance2), there), density);
+    active = pti_mw_and(active, pti_mw_and(pti_fw_lt(zero, here), pti_fw_lt(zero, p)));
+    for (i = (int)pti_mw_bits(active); i; i &= i - 1) rays++;
+    if (rays == 0) return 0;
+    end.t = distance;
+    end.i = end.margin = zero;
+    weight = pti_fw_div(pti_fw_mul(here, inverse_pi), p);
+    if (technique == PTI_TECHNIQUE_MIS) weight = pti_fw_mul(weight, pti_lock_weight(p, pti_fw_mul(here, inverse_pi), heuristic));
+    weight = pti_fw_select(pti_lock_ask(k, o, w, k->e, &end, 1), zero, weight);
+    weight = pti_fw_select(active, weight, zero);
+    albedo = pti_w3_mul(albedo, pti_w3_mul(pti_row3(row + PTI_ROW_BETA), pti_lit3(k, PTI_LIT_EMISSION, light)));
+    pti_row3_set(row + PTI_ROW_SUM, pti_w3_along(albedo, weight, pti_row3(row + PTI_ROW_SUM)));
+    return rays;
+}
+
+/* A direction about n by the cosine, as pt_warp_cosine has it; *z: the cosine. */
+PTI_INLINE pti_w3 pti_lock_cosine(pti_w3 n, pti_fw u, pti_fw v, pti_fw *z)
+{
+    const pti_fw two = pti_fw_set(2), shift = pti_fw_set((float)(PTI_2_M24 - 1)), one = pti_fw_set(1);
+    const pti_fw a = pti_fw_madd(two, u, shift), b = pti_fw_madd(two, v, shift);
+    const pti_mw wide = pti_fw_lt(pti_fw_abs(b), pti_fw_abs(a));
+    const pti_fw r = pti_fw_select(wide, a, b), other = pti_fw_select(wide, b, a);
+    pti_fw sine, cosine;
+    pti_w3 s, t;
+    pti_fw_sincos(pti_fw_mul(pti_fw_div(other, r), pti_fw_set((float)(PT_PI / 4))), &sine, &cosine);
+    *z = pti_fw_sqrt(pti_fw_mul(pti_fw_sub(one, r), pti_fw_add(one, r)));
+    pti_lock_frame(n, &s, &t);
+    s = pti_w3_scale(s, pti_fw_mul(r, pti_fw_select(wide, cosine, sine)));
+    return pti_w3_normalize(pti_w3_along(n, *z, pti_w3_along(t, pti_fw_mul(r, pti_fw_select(wide, sine, cosine)), s)));
+}
+
+/* Mirrors and glass: the next direction, and what beta is multiplied by. */
+PTI_INLINE pti_w3 pti_lock_specular(const pti_lockstep *k, const pti_lock_surface *s, pti_w3 d, pti_fw u, pti_w3 *weight, pti_lane_row *row)
+{
+    const pti_fw one = pti_fw_set(1), zero = pti_fw_set(0), two_cosines = pti_fw_add(s->cosine, s->cosine);
+    const pti_fw ior = pti_fw_gather(k->of[PTI_OF_IOR], s->i), eta = pti_fw_select(s->front, pti_fw_div(one, ior), ior);
+    const pti_fw sine2 = pti_fw_mul(pti_fw_mul(eta, eta), pti_fw_mul(pti_fw_sub(one, s->cosine), pti_fw_add(one, s->cosine)));
+    const pti_fw other = pti_fw_sqrt(pti_fw_max(zero, pti_fw_sub(one, sine2)));
+    const pti_fw rs = pti_fw_div(pti_fw_nmadd(other, pti_fw_set(1), pti_fw_mul(eta, s->cosine)), pti_fw_madd(eta, s->cosine, other));
+    const pti_fw rp = pti_fw_div(pti_fw_nmadd(eta, other, s->cosine), pti_fw_madd(eta, other, s->cosine));
+    const pti_fw half = pti_fw_mul(pti_fw_set(0.5f), pti_fw_madd(rs, rs, pti_fw_mul(rp, rp)));
+    const pti_fw fresnel = pti_fw_select(pti_fw_lt(sine2, one), half, one);
+    const pti_mw bent = pti_mw_and(pti_lock_is(s, PT_MATERIAL_DIELECTRIC), pti_fw_le(fresnel, u));
+    const pti_fw eta2 = pti_fw_mul(eta, eta);
+    const pti_w3 mirrored = pti_w3_along(s->n, two_cosines, d);
+    const pti_w3 refracted = pti_w3_along(s->n, pti_fw_nmadd(other, one, pti_fw_mul(eta, s->cosine)), pti_w3_scale(d, eta));
+    const pti_w3 grey = pti_w3_make(pti_fw_select(bent, eta2, one), pti_fw_select(bent, eta2, one), pti_fw_select(bent, eta2, one));
+    *weight = pti_w3_select(pti_lock_is(s, PT_MATERIAL_DIELECTRIC), grey, *weight);
+    row[PTI_ROW_ETA2].f = pti_fw_select(bent, pti_fw_div(row[PTI_ROW_ETA2].f, eta2), row[PTI_ROW_ETA2].f);
+    return pti_w3_normalize(pti_w3_select(bent, refracted, mirrored));
+}
+
+/* Russian roulette, as pti_roulette; the lanes that go on. */
+PTI_INLINE pti_mw pti_lock_roulette(const pt_li_options *options, pti_lane_row *row, pti_w3 *beta, pti_fw u)
+{
+    const int constant = options->roulette == PT_ROULETTE_CONSTANT;
+    const int start = options->roulette_start > 0 ? options->roulette_start : constant ? 1 : 3;
+    const pti_fw scale = pti_fw_set(options->roulette_scale > 0 ? (float)options->roulette_scale : 4);
+    pti_fw q = pti_fw_mul(pti_fw_mul(scale, pti_fw_max(beta->x, pti_fw_max(beta->y, beta->z))), row[PTI_ROW_ETA2].f);
+    const pti_mw due = pti_fw_le(pti_fw_set((float)start), pti_fw_from_words(row[PTI_ROW_EDGES].u));
+    if (constant) q = pti_fw_set(options->roulette_survival > 0 ? (float)options->roulette_survival : 0.8f);
+    q = pti_fw_min(q, pti_fw_set((float)(1 - PTI_2_M24)));
+    q = pti_fw_select(due, q, pti_fw_set(1));
+    *beta = pti_w3_scale(*beta, pti_fw_div(pti_fw_set(1), q));
+    return pti_fw_lt(u, q);
+}
+
+PTI_INLINE int pti_count_bits(unsigned x)
+{
+    int n = 0;
+    for (; x; x &= x - 1) n++;
+    return n;
+}
+
+/* What all walks of a task share, and those under way. */
+enum { PTI_LOCK_SLOTS = 2048, PTI_LOCK_QUEUE = 64 };
+typedef struct pti_lock_work {
+    const pti_lockstep *k;
+    const pt_li_options *options;
+    int technique, queued, cancelled;
+    unsigned alive;                 /* lanes that hold a path                                              */
+    uint64_t rays;
+    pti_lane_row row[PTI_ROWS];
+    uint32_t queue[PTI_LOCK_QUEUE][PTI_ROWS]; /* paths that wait for a lane                                */
+    double slots[PTI_LOCK_SLOTS][3]; /* what each path has found                                           */
+} pti_lock_work;
+
+/* The next edge of the paths in `row`, where `active`, as in pti_path; the lanes that go on. */
+PTI_INLINE unsigned pti_lock_vertex(pti_lock_work *w, pti_lane_row *row, unsigned active, const pti_lock_numbers *u, pti_fw u_roulette, float e)
+{
+    const pti_lockstep *k = w->k;
+    const pt_li_options *options = w->options;
+    const pti_w3 o = pti_row3(row + PTI_ROW_O), d = pti_row3(row + PTI_ROW_D);
+    const pti_fw zero = pti_fw_set(0);
+    pti_lock_surface s;
+    pti_lock_best best;
+    pti_w3 weight, beta, next;
+    pti_fw cosine, density;
+    pti_mw go;
+    best.t = best.margin = pti_fw_set(PTI_LOCK_FAR);
+    best.i = zero;
+    pti_lock_ask(k, o, d, e, &best, 0);
+    w->rays += (uint64_t)pti_count_bits(active);
+    s.met = pti_mw_and(pti_mw_of_bits(active), pti_fw_lt(best.t, pti_fw_set(PTI_LOCK_FAR)));
+    pti_lock_land(k, o, d, &best, &s);
+    pti_lock_emission(k, &s, &best, row, w->technique, options->heuristic);
+    go = s.met;
+    if (options->max_edges > 0) go = pti_mw_and(go, pti_fw_lt(pti_fw_from_words(row[PTI_ROW_EDGES].u), pti_fw_set((float)options->max_edges)));
+    if (!pti_mw_bits(go)) return 0;
+    weight = pti_gather3(k->of, PTI_OF_ALBEDO, s.i);
+    if (w->technique != PTI_TECHNIQUE_PLAIN && k->light_count > 0) {
+        const pti_mw asks = k->specular ? pti_mw_and(go, pti_lock_is(&s, PT_MATERIAL_DIFFUSE)) : go;
+        w->rays += (uint64_t)pti_lock_direct(k, &s, weight, asks, u, row, w->technique, options->heuristic);
+    }
+    next = pti_lock_cosine(s.n, u->bsdf0, u->bsdf1, &cosine);
+    density = pti_fw_mul(cosine, pti_fw_set((float)(1 / PT_PI)));
+    if (k->specular) {
+        const pti_mw diffuse = pti_lock_is(&s, PT_MATERIAL_DIFFUSE);
+        if (pti_mw_bits(diffuse) != pti_mw_bits(pti_mw_of_bits(~0u))) {
+            const pti_w3 bounced = pti_lock_specular(k, &s, d, u->lobe, &weight, row);
+            next = pti_w3_select(diffuse, next, bounced);
+            density = pti_fw_select(diffuse, density, pti_fw_set(-1));
+        }
+    }
+    beta = pti_w3_mul(pti_row3(row + PTI_ROW_BETA), weight);
+    go = pti_mw_and(go, pti_fw_lt(zero, pti_fw_max(beta.x, pti_fw_max(beta.y, beta.z))));
+    if (options->roulette != PT_ROULETTE_NONE) go = pti_mw_and(go, pti_lock_roulette(options, row, &beta, u_roulette));
+    pti_row3_set(row + PTI_ROW_BETA, beta);
+    pti_row3_set(row + PTI_ROW_D, next);
+    cosine = pti_fw_select(pti_fw_lt(pti_w3_dot(s.n, next), zero), pti_fw_set(-2 * k->e), pti_fw_set(2 * k->e));
+    pti_row3_set(row + PTI_ROW_O, pti_w3_along(s.n, cosine, s.p));
+    row[PTI_ROW_DENSITY].f = density;
+    row[PTI_ROW_EDGES].u = pti_uw_add(row[PTI_ROW_EDGES].u, pti_uw_set(1));
+    return pti_mw_bits(go);
+}
+
+/* Moves what paths have found to their slots. */
+static void pti_lock_flush(pti_lock_work *w, pti_lane_row *row, unsigned lanes)
+{
+    for (; lanes; lanes &= lanes - 1) {
+        const int i = pti_lowest_bit(lanes);
+        double *slot = w->slots[row[PTI_ROW_SLOT].bits[i]];
+        int k;
+        for (k = 0; k < 3; k++) {
+            slot[k] += (double)row[PTI_ROW_SUM + k].v[i];
+            row[PTI_ROW_SUM + k].v[i] = 0;
+        }
+    }
+}
+
+/* Later vertices, until no more than `rest` paths wait (and, at 0, none walks). A path's sum is emptied into its slot every 64
+   edges, so that its float never grows far above what is added. */
+static void pti_lock_walk(pti_lock_work *w, int rest)
+{
+    const unsigned all = ~0u >> (32 - PTI_WIDTH);
+    pti_lane_row *row = w->row;
+    uint32_t steps = 0;
+    while (w->queued > rest || (rest == 0 && w->alive)) {
+        pti_lock_numbers u;
+        unsigned free_lanes = all & ~w->alive, on, full;
+        pti_uw a, b;
+        pti_fw zero = pti_fw_set(0), roulette;
+        for (; free_lanes && w->queued > 0; free_lanes &= free_lanes - 1) {
+            const uint32_t *path = w->queue[--w->queued];
+            const int i = pti_lowest_bit(free_lanes);
+            int k;
+            for (k = 0; k < PTI_ROWS; k++) row[k].bits[i] = path[k];
+            w->alive |= 1u << i;
+        }
+        a = row[PTI_ROW_A].u;
+        b = row[PTI_ROW_B].u;
+        u.which = w->k->light_count > 1 ? pti_lock_next(&a, &b) : zero;
+        u.light0 = pti_lock_next(&a, &b);
+        u.light1 = pti_lock_next(&a, &b);
+        u.bsdf0 = pti_lock_next(&a, &b);
+        u.bsdf1 = pti_lock_next(&a, &b);
+        u.lobe = w->k->specular ? pti_lock_next(&a, &b) : zero;
+        roulette = pti_lock_next(&a, &b);
+        row[PTI_ROW_A].u = a;
+        row[PTI_ROW_B].u = b;
+        on = pti_lock_vertex(w, row, w->alive, &u, roulette, w->k->e);
+        full = w->alive & pti_mw_bits(pti_fw_lt(pti_fw_from_words(pti_uw_and(row[PTI_ROW_EDGES].u, pti_uw_set(63))), pti_fw_set(1)));
+        pti_lock_flush(w, row, (w->alive & ~on) | full);
+        w->alive &= on;
+        if ((++steps & 0xfff) == 0 && w->options->poll && w->options->poll(w->options->poll_user)) {
+            w->cancelled = 1;
+            return;
+        }
+    }
+}
+
+/* The first vertex: `active` paths start with these numbers; those that go on wait. */
+static void pti_lock_start(pti_lock_work *w, pti_lane_row *row, unsigned active, const pti_lock_numbers *u)
+{
+    const pti_fw one = pti_fw_set(1), zero = pti_fw_set(0);
+    pti_uw a = row[PTI_ROW_A].u, b = row[PTI_ROW_B].u;
+    const pti_fw roulette = pti_lock_next(&a, &b);
+    unsigned on;
+    row[PTI_ROW_A].u = a;
+    row[PTI_ROW_B].u = b;
+    pti_row3_set(row + PTI_ROW_BETA, pti_w3_make(one, one, one));
+    pti_row3_set(row + PTI_ROW_SUM, pti_w3_make(zero, zero, zero));
+    row[PTI_ROW_DENSITY].f = pti_fw_set(-1);
+    row[PTI_ROW_ETA2].f = one;
+    row[PTI_ROW_EDGES].u = pti_uw_set(1);
+    on = pti_lock_vertex(w, row, active, u, roulette, w->k->e_camera);
+    pti_lock_flush(w, row, active & ~on);
+    for (on &= active; on; on &= on - 1) {
+        const int i = pti_lowest_bit(on);
+        uint32_t *path = w->queue[w->queued++];
+        int k;
+        for (k = 0; k < PTI_ROWS; k++) path[k] = row[k].bits[i];
+    }
+    if (w->queued > PTI_LOCK_QUEUE - PTI_WIDTH) pti_lock_walk(w, PTI_WIDTH);
+}
+
+#endif /* PTI_HAS_LOCKSTEP */
 
 /* =====================================================================================================
    [PT-17] FILES: implementation
@@ -11690,6 +12793,31 @@ static pt_li_fn pti_pick_instance(const pt_method *method, const pt_scene *scene
     return pti_path_diffuse;
 }
 
+#if PTI_HAS_LOCKSTEP
+/* Can paths walk together here? Then the scene is made ready for that, and *technique is the method's. */
+static int pti_pick_lockstep(const pt_method *method, const pt_scene *scene, const pt_render_desc *d, pti_lockstep *out, int *technique)
+{
+    const pt_camera *c = &d->camera;
+    const pt_real ahead = c->lens_radius + c->near_distance * (1 + c->tan_half * (1 + (pt_real)d->width / (pt_real)d->height));
+    *technique = PTI_TECHNIQUE_MIS;
+#if PTI_HAS_ALL_METHODS
+    if (method->li == pt_li_path_light) *technique = PTI_TECHNIQUE_LIGHT;
+    else if (method->li == pt_li_path_plain) *technique = PTI_TECHNIQUE_PLAIN;
+    else
+#endif
+        if (method->li != pt_li_path) return 0;
+#if PTI_HAS_OBSERVER
+    if (d->li.observer) return 0;
+#endif
+#if PTI_HAS_LPE
+    if (d->li.lpe) return 0;
+#endif
+    if (d->no_lockstep || d->general_body || d->aov || d->sampler == PT_SAMPLER_STRATIFIED) return 0;
+    if (d->li.max_edges >= 1 << 24 || d->li.roulette_start >= 1 << 24) return 0; /* they are counted in floats */
+    return pti_lockstep_make(out, scene, pt_v3(pti_fabs(c->position.x) + ahead, pti_fabs(c->position.y) + ahead, pti_fabs(c->position.z) + ahead));
+}
+#endif
+
 PTDEF const char *pt_sampler_name(pt_sampler_kind kind)
 {
     switch (kind) {
@@ -11844,6 +12972,7 @@ static uint64_t pti_fingerprint(const pt_scene *scene, const pt_render_desc *d, 
     pti_hash_word(&h, d->seed);
     pti_hash_word(&h, (uint64_t)d->li.max_edges << 32 | (uint64_t)d->li.roulette << 16 | (uint64_t)d->li.heuristic);
     pti_hash_double(&h, (double)d->li.roulette_survival);
+    pti_hash_double(&h, (double)d->li.roulette_scale);
     pti_hash_word(&h, (uint64_t)d->li.roulette_start << 1 | (uint64_t)(d->single_net != 0));
     pti_hash_word(&h, (uint64_t)d->filter);
     pti_hash_double(&h, d->filter_radius);
@@ -11879,6 +13008,10 @@ typedef struct pti_pass {
     pti_counter rays, pixels, nonfinite; /* of this pass so far                                            */
     pti_counter asking;     /* taken by the thread that asks the user                                      */
     pti_counter cancel;     /* 1: the user wants to stop, 2: a path outlasted the time budget              */
+#if PTI_HAS_LOCKSTEP
+    const pti_lockstep *lockstep; /* NULL: paths one at a time                                             */
+    int technique;
+#endif
 } pti_pass;
 
 static int pti_rgbd_finite(pt_rgbd c)
@@ -11973,6 +13106,222 @@ static int pti_poll(void *context)
     return PTI_LOAD(&p->cancel) != 0;
 }
 
+#if PTI_HAS_LOCKSTEP
+/* --- a tile in lockstep --- */
+
+/* What the sampler's numbers of a pixel and half are made with: the orders of three sets of four dimensions, and scramblings. */
+typedef struct pti_lock_seeds {
+    uint64_t stream, key;
+    uint32_t order[3], film[2], bsdf[2], light[2], choice[2];
+} pti_lock_seeds;
+
+static void pti_lock_pair(const pt_sampler *s, uint32_t dimension, uint32_t seeds[2])
+{
+    const uint64_t both = pti_sampler_hash(s, dimension >> 1, 1);
+    seeds[0] = (uint32_t)both;
+    seeds[1] = (uint32_t)(both >> 32);
+}
+
+static void pti_lock_seed(pti_lock_seeds *out, pt_sampler *s, uint64_t stream)
+{
+    uint32_t k;
+    if (out->stream == stream) return;
+    pt_sampler_start(s, stream, 0);
+    out->stream = stream;
+    out->key = s->key;
+    for (k = 0; k < 3; k++) out->order[k] = (uint32_t)pti_sampler_hash(s, k + 1, 2);
+    pti_lock_pair(s, PT_DIM_FILM, out->film);
+    pti_lock_pair(s, PT_DIM_EDGE(1) + PT_DIM_BSDF, out->bsdf);
+    pti_lock_pair(s, PT_DIM_EDGE(1) + PT_DIM_LIGHT, out->light);
+    pti_lock_pair(s, PT_DIM_EDGE(1) + PT_DIM_LIGHT_CHOICE, out->choice);
+}
+
+/* Which paths start together: pixel, sample, and rows of seeds. */
+typedef struct pti_lock_batch {
+    pti_lane_row index, order[3], film[2], bsdf[2], light[2], choice[2];
+    pti_lane_row x, y;
+} pti_lock_batch;
+
+static void pti_lock_lane(pti_lock_batch *b, pti_lane_row *row, int lane, const pti_lock_seeds *s, uint32_t index)
+{
+    const uint64_t walk = pt_hash64(s->key ^ ((uint64_t)0x6c6f636bu << 32 | index)); /* a use of its own */
+    int k;
+    b->index.bits[lane] = index;
+    for (k = 0; k < 3; k++) b->order[k].bits[lane] = s->order[k];
+    for (k = 0; k < 2; k++) {
+        b->film[k].bits[lane] = s->film[k];
+        b->bsdf[k].bits[lane] = s->bsdf[k];
+        b->light[k].bits[lane] = s->light[k];
+        b->choice[k].bits[lane] = s->choice[k];
+    }
+    row[PTI_ROW_A].bits[lane] = (uint32_t)walk;
+    row[PTI_ROW_B].bits[lane] = (uint32_t)(walk >> 32) | 1u; /* never both 0 */
+}
+
+/* Dimension d of the set whose points have these numbers, 24 bits. */
+PTI_INLINE pti_fw pti_lock_point(pti_uw n, int d, pti_uw seed)
+{
+    const pti_uw x = pti_lock_reverse(pti_lock_scramble(pti_lock_sobol(n, d), seed));
+    return pti_fw_mul(pti_fw_from_words(pti_uw_shr(x, 8)), pti_fw_set((float)PTI_2_M24));
+}
+PTI_INLINE pti_uw pti_lock_order(const pti_lock_batch *b, int set)
+{
+    return pti_lock_reverse(pti_lock_scramble(pti_lock_reverse(b->index.u), b->order[set].u));
+}
+
+/* Numbers of the film (and lens), and of the first vertex. */
+static void pti_lock_draw(const pti_lock_work *w, const pti_lock_batch *b, pti_lane_row *row, int sobol, int lens, pti_lane_row film[4], pti_lock_numbers *u)
+{
+    const pti_fw zero = pti_fw_set(0);
+    u->which = u->lobe = film[2].f = film[3].f = zero;
+    if (sobol) {
+        const pti_uw n = pti_lock_order(b, 0), m = pti_lock_order(b, 1);
+        film[0].f = pti_lock_point(n, 0, b->film[0].u);
+        film[1].f = pti_lock_point(n, 1, b->film[1].u);
+        u->bsdf0 = pti_lock_point(m, 0, b->bsdf[0].u);
+        u->bsdf1 = pti_lock_point(m, 1, b->bsdf[1].u);
+        u->light0 = pti_lock_point(m, 2, b->light[0].u);
+        u->light1 = pti_lock_point(m, 3, b->light[1].u);
+        if (w->k->light_count > 1 || w->k->specular) {
+            const pti_uw l = pti_lock_order(b, 2);
+            u->which = pti_lock_point(l, 0, b->choice[0].u);
+            u->lobe = pti_lock_point(l, 1, b->choice[1].u);
+        }
+    } else {
+        u->bsdf0 = pti_lock_next(&row[PTI_ROW_A].u, &row[PTI_ROW_B].u);
+        u->bsdf1 = pti_lock_next(&row[PTI_ROW_A].u, &row[PTI_ROW_B].u);
+        u->light0 = pti_lock_next(&row[PTI_ROW_A].u, &row[PTI_ROW_B].u);
+        u->light1 = pti_lock_next(&row[PTI_ROW_A].u, &row[PTI_ROW_B].u);
+        u->which = pti_lock_next(&row[PTI_ROW_A].u, &row[PTI_ROW_B].u);
+        u->lobe = pti_lock_next(&row[PTI_ROW_A].u, &row[PTI_ROW_B].u);
+        film[0].f = pti_lock_next(&row[PTI_ROW_A].u, &row[PTI_ROW_B].u);
+        film[1].f = pti_lock_next(&row[PTI_ROW_A].u, &row[PTI_ROW_B].u);
+    }
+    if (lens) {
+        film[2].f = pti_lock_next(&row[PTI_ROW_A].u, &row[PTI_ROW_B].u);
+        film[3].f = pti_lock_next(&row[PTI_ROW_A].u, &row[PTI_ROW_B].u);
+    }
+}
+
+/* Rays of a pinhole through these points of the picture, all lanes at once. */
+static void pti_lock_pinhole(const pt_render_desc *d, const pti_lock_batch *b, pti_lane_row film[4], pti_lane_row *row)
+{
+    const pt_camera *c = &d->camera;
+    const float axes[3][3] = {{c->right.x, c->right.y, c->right.z}, {c->up.x, c->up.y, c->up.z}, {c->forward.x, c->forward.y, c->forward.z}};
+    const float wide = 2 * c->tan_half / (float)d->height, half_x = (float)d->width / 2, half_y = (float)d->height / 2;
+    const pti_fw x = pti_fw_sub(pti_fw_add(b->x.f, film[0].f), pti_fw_set(half_x)), y = pti_fw_sub(pti_fw_set(half_y), pti_fw_add(b->y.f, film[1].f));
+    const pti_w3 across = pti_w3_along(pti_w3_set(axes[0]), pti_fw_mul(x, pti_fw_set(wide)), pti_w3_set(axes[2]));
+    pti_row3_set(row + PTI_ROW_D, pti_w3_normalize(pti_w3_along(pti_w3_set(axes[1]), pti_fw_mul(y, pti_fw_set(wide)), across)));
+    pti_row3_set(row + PTI_ROW_O, pti_w3_make(pti_fw_set(c->position.x), pti_fw_set(c->position.y), pti_fw_set(c->position.z)));
+}
+
+/* The camera's ray of each lane, as in pti_render_sample. */
+static void pti_lock_camera(const pt_render_desc *d, const pti_lock_batch *b, pti_lane_row film[4], pti_lane_row *row, int count)
+{
+    int i;
+    if (d->filter == PT_FILTER_BOX && !(d->filter_radius > 0) && !(d->camera.lens_radius > 0) && !(d->camera.near_distance > 0)) {
+        pti_lock_pinhole(d, b, film, row);
+        return;
+    }
+    for (i = 0; i < count; i++) {
+        pt_vec2 u = pt_v2(film[0].v[i], film[1].v[i]);
+        pt_ray ray;
+        if (d->filter != PT_FILTER_BOX || d->filter_radius > 0) {
+            u = pt_filter_sample(d->filter, d->filter_radius, u);
+            u = pt_v2(u.x + PTI_R(0.5), u.y + PTI_R(0.5));
+        }
+        ray = pt_camera_ray(&d->camera, (pt_real)d->width / (pt_real)d->height, (b->x.v[i] + u.x) / (pt_real)d->width,
+                            (b->y.v[i] + u.y) / (pt_real)d->height, pt_v2(film[2].v[i], film[3].v[i]));
+        row[PTI_ROW_O].v[i] = ray.o.x;
+        row[PTI_ROW_O + 1].v[i] = ray.o.y;
+        row[PTI_ROW_O + 2].v[i] = ray.o.z;
+        row[PTI_ROW_D].v[i] = ray.d.x;
+        row[PTI_ROW_D + 1].v[i] = ray.d.y;
+        row[PTI_ROW_D + 2].v[i] = ray.d.z;
+    }
+}
+
+/* Where a tile's paths have got to: they go through the samples of a pixel, then to the next pixel of the row. */
+typedef struct pti_lock_cursor {
+    int x, y;
+    uint32_t sample;
+} pti_lock_cursor;
+
+PTI_INLINE void pti_lock_advance(const pti_pass *p, const int box[4], pti_lock_cursor *at)
+{
+    if (++at->sample < p->end) return;
+    at->sample = p->begin;
+    if (++at->x < box[2]) return;
+    at->x = box[0];
+    at->y++;
+}
+
+/* The next `count` paths of a tile, each in its slot, added to the film in order. */
+static void pti_lock_run(pti_pass *p, pti_lock_work *w, pt_sampler *sampler, const int box[4], pti_lock_cursor *at, uint32_t count)
+{
+    const pt_render_desc *d = p->desc;
+    pti_lock_cursor from = *at;
+    pti_lock_seeds seeds[2];
+    pti_lock_batch batch;
+    pti_lane_row row[PTI_ROWS], film[4];
+    uint32_t j, i;
+    memset(seeds, 0xff, sizeof seeds);
+    memset(&batch, 0, sizeof batch);
+    memset(row, 0, sizeof row);
+    memset(w->slots, 0, sizeof w->slots);
+    for (j = 0; j < count && !w->cancelled; j += PTI_WIDTH) {
+        const uint32_t lanes = count - j < PTI_WIDTH ? count - j : PTI_WIDTH;
+        pti_lock_numbers u;
+        for (i = 0; i < lanes; i++, pti_lock_advance(p, box, at)) {
+            const uint32_t half = d->single_net ? 0 : at->sample & 1u;
+            const uint64_t pixel = (uint64_t)at->y * (uint64_t)d->width + (uint64_t)at->x;
+            batch.x.v[i] = (float)at->x;
+            batch.y.v[i] = (float)at->y;
+            pti_lock_seed(&seeds[half], sampler, 2 * pixel + half);
+            pti_lock_lane(&batch, row, (int)i, &seeds[half], d->single_net ? at->sample : at->sample >> 1);
+            row[PTI_ROW_SLOT].bits[i] = j + i;
+        }
+        pti_lock_draw(w, &batch, row, d->sampler == PT_SAMPLER_SOBOL, d->camera.lens_radius > 0, film, &u);
+        pti_lock_camera(d, &batch, film, row, (int)lanes);
+        pti_lock_start(w, row, ~0u >> (32 - lanes), &u);
+    }
+    pti_lock_walk(w, 0);
+    for (j = 0; j < count && !w->cancelled; j++, pti_lock_advance(p, box, &from)) {
+        const double *L = w->slots[j];
+        double *sum = p->film->half[d->single_net ? 0 : from.sample & 1u] + 3 * ((size_t)from.y * (size_t)d->width + (size_t)from.x);
+        if (pti_rgbd_finite(pt_rgbd3(L[0], L[1], L[2]))) pti_add3(sum, L[0], L[1], L[2]);
+        else PTI_ADD(&p->nonfinite, 1);
+    }
+}
+
+/* pti_render_tile in lockstep. */
+static void pti_lock_tile(pti_pass *p, const int box[4], pt_sampler *sampler)
+{
+    const uint64_t n = p->end - p->begin, all = (uint64_t)(box[2] - box[0]) * (uint64_t)(box[3] - box[1]) * n;
+    pti_lock_cursor at;
+    uint64_t j, done = 0;
+    pti_lock_work w;
+    w.k = p->lockstep;
+    w.options = &p->options;
+    w.technique = p->technique;
+    w.queued = w.cancelled = 0;
+    w.alive = 0;
+    memset(w.row, 0, sizeof w.row);
+    at.x = box[0];
+    at.y = box[1];
+    at.sample = p->begin;
+    for (j = 0; j < all && !w.cancelled && !PTI_LOAD(&p->cancel); j += PTI_LOCK_SLOTS) {
+        const uint64_t end = all - j < PTI_LOCK_SLOTS ? all : j + PTI_LOCK_SLOTS;
+        w.rays = 0;
+        pti_lock_run(p, &w, sampler, box, &at, (uint32_t)(end - j));
+        PTI_ADD(&p->rays, (pti_counter)w.rays);
+        PTI_ADD(&p->pixels, (pti_counter)(end / n - done));
+        done = end / n;
+        pti_ask_user(p);
+    }
+}
+#endif
+
 /* A task: one tile, all samples of the pass. */
 static void pti_render_tile(void *context, int index)
 {
@@ -11984,6 +13333,13 @@ static void pti_render_tile(void *context, int index)
     pt_li_info info;
     uint32_t s;
     int x, y;
+#if PTI_HAS_LOCKSTEP
+    if (p->lockstep) {
+        const int box[4] = {x0, y0, x1, y1};
+        pti_lock_tile(p, box, &sampler);
+        return;
+    }
+#endif
     for (y = y0; y < y1; y++)
         for (x = x0; x < x1; x++) {
             info.rays = 0;
@@ -12137,6 +13493,7 @@ static const char *pti_check_desc(const pt_render_desc *d)
     if ((int)o->roulette < 0 || o->roulette > PT_ROULETTE_NONE) return "desc.li.roulette is unknown";
     if ((int)o->heuristic < 0 || o->heuristic > PT_HEURISTIC_MAXIMUM) return "desc.li.heuristic is unknown";
     if (!(o->roulette_survival >= 0 && o->roulette_survival < 1)) return "desc.li.roulette_survival is not in [0,1)";
+    if (!pti_not_negative((double)o->roulette_scale)) return "desc.li.roulette_scale is negative or not finite";
     if ((int)d->filter < 0 || d->filter > PT_FILTER_GAUSSIAN) return "desc.filter is unknown";
     if (!(d->filter_radius >= 0 && d->filter_radius <= 64)) return "desc.filter_radius is not in [0, 64]";
 #if PTI_HAS_WHITTED
@@ -12253,8 +13610,17 @@ static pt_result pti_render(pti_pass *p, pt_film *film, pt_report *report)
     const pt_method *method = pt_method_find(d->method);
     pt_film copy = PT_FILM_INIT;
     pt_result result;
+#if PTI_HAS_LOCKSTEP
+    pti_lockstep lockstep;
+#endif
     if (d->sampler == PT_SAMPLER_STRATIFIED) p->planned = d->single_net ? d->first_sample + d->spp : (d->first_sample + d->spp + 1) / 2;
     p->li = pti_pick_instance(method, p->scene, d, &report->body);
+#if PTI_HAS_LOCKSTEP
+    if (pti_pick_lockstep(method, p->scene, d, &lockstep, &p->technique)) {
+        p->lockstep = &lockstep;
+        report->body = PTI_WIDTH == 16 ? "lockstep16" : "lockstep8";
+    }
+#endif
     p->options = d->li;
     p->options.poll = pti_poll;
     p->options.poll_user = p;
