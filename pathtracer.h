@@ -10231,7 +10231,7 @@ typedef struct pti_lock_work {
 } pti_lock_work;
 
 /* The next edge of the paths in `row`, where `active`, as in pti_path; the lanes that go on. */
-PTI_INLINE unsigned pti_lock_vertex(pti_lock_work *w, pti_lane_row *row, unsigned active, const pti_lock_numbers *u, pti_fw u_roulette, float e)
+static unsigned pti_lock_vertex(pti_lock_work *w, pti_lane_row *row, unsigned active, const pti_lock_numbers *u, pti_fw u_roulette, float e)
 {
     const pti_lockstep *k = w->k;
     const pt_li_options *options = w->options;
