@@ -9967,15 +9967,17 @@ PTI_INLINE pti_w3 pti_gather3(const float (*table)[PTI_LOCK_MAX], int row, pti_u
 PTI_INLINE void pti_lock_land(const pti_lockstep *k, pti_w3 o, pti_w3 d, const pti_lock_best *best, pti_lock_surface *s)
 {
     const pti_fw zero = pti_fw_set(0), inset = pti_fw_set(16 * k->e);
+    pti_mw near_edge;
     pti_w3 n;
     s->i = pti_uw_from_floats(best->i);
     s->p = pti_w3_along(d, best->t, o);
     n = pti_gather3(k->of, PTI_OF_N, s->i);
     s->p = pti_w3_along(n, pti_fw_sub(zero, pti_w3_dot_add(n, s->p, pti_fw_gather(k->of[PTI_OF_D], s->i))), s->p);
-    if (pti_mw_bits(pti_fw_lt(best->margin, inset))) {
+    near_edge = pti_fw_lt(best->margin, inset);
+    if (pti_mw_bits(near_edge)) {
         const pti_fw depth = pti_fw_gather(k->of[PTI_OF_DEPTH], s->i);
-        const pti_fw share = pti_fw_max(zero, pti_fw_div(pti_fw_sub(inset, best->margin), pti_fw_sub(depth, best->margin)));
-        s->p = pti_w3_along(pti_w3_sub(pti_gather3(k->of, PTI_OF_CENTRE, s->i), s->p), share, s->p);
+        const pti_fw share = pti_fw_div(pti_fw_sub(inset, best->margin), pti_fw_sub(depth, best->margin));
+        s->p = pti_w3_along(pti_w3_sub(pti_gather3(k->of, PTI_OF_CENTRE, s->i), s->p), pti_fw_select(near_edge, share, zero), s->p);
     }
     s->ball = pti_fw_lt(pti_fw_set(1e38f), best->margin);
     if (pti_mw_bits(s->ball)) { /* n = 0 for spheres, so p is as it was */
