@@ -10134,7 +10134,7 @@ PTI_INLINE int pti_lock_direct(const pti_lockstep *k, const pti_lock_surface *s,
     density = pti_lock_flat_point(k, light, u, &q, &n);
     if (k->sphere_lights) {
         pti_w3 ball;
-        const pti_fw per_angle = pti_lock_ball_point(k, light, s->p, u, &ball);
+        const pti_fw per_angle = pti_lock_ball_point(k, light, o, u, &ball);
         flat = pti_fw_le(pti_lit(k, PTI_LIT_RADIUS, light), zero);
         q = pti_w3_select(flat, q, ball);
         density = pti_fw_select(flat, density, per_angle);
