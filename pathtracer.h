@@ -9281,7 +9281,8 @@ PTDEF pt_rgbd pt_li_branching(const pt_scene *scene, const pt_ray *ray, pt_sampl
    - Decisions are made in float. A hit point is put back on the plane of its primitive, in a distance of at least
      16 e from the primitive's edges, and the next ray starts 2 e above it; e is the bound of the distance of a computed
      point from its plane (derived at pti_lockstep_make). Primitives are wider by what rounding can do to a hit, so
-     that no ray passes between two that share an edge. Scenes with parts smaller than 4096 e are left to pti_path.
+     that no ray passes between two that share an edge. Scenes with parts smaller than 2048 e, or with edges sharper than
+     8 degrees, are left to pti_path. Where a ball touches a wall, a point within sqrt(4 e r) of the contact starts inside it.
 
    A shadow ray starts and ends on surfaces. A plane that has all surfaces on one side cannot come between two points
    of them: the walls of a room are not asked. Parallelograms whose edges follow two axes are tested by three
@@ -9635,6 +9636,27 @@ static int pti_lock_blocks(const pti_lock_item *q, const pti_lock_item *all, int
     return low < -e && high > e;
 }
 
+/* Do two flat items meet at an edge under an angle with a cosine above 0.99 (8 degrees)? There a point 16 e from the edge may be
+   less than 2 e from the other one. */
+static int pti_lock_wedge(const pti_lock_item *a, const pti_lock_item *b, double e)
+{
+    pti_d3 into[2];
+    int i, j, k;
+    for (i = 0; i < a->corners; i++)
+        for (j = 0; j < b->corners; j++) {
+            const pti_d3 t = pti_d_normalize(pti_d_between(b->c[j], b->c[(j + 1) % b->corners]));
+            const pti_d3 p = pti_d_between(b->c[j], a->c[i]), q = pti_d_between(b->c[j], a->c[(i + 1) % a->corners]);
+            if (pti_d_length(pti_d_cross(p, t)) > e || pti_d_length(pti_d_cross(q, t)) > e) continue;
+            for (k = 0; k < 2; k++) {
+                const pti_lock_item *s = k ? b : a;
+                const pti_d3 d = pti_d_between(b->c[j], s->c[((k ? j : i) + 2) % s->corners]);
+                into[k] = pti_d_normalize(pti_d_sub(d, pti_d_scale(t, pti_d_dot(d, t))));
+            }
+            if (pti_d_dot(into[0], into[1]) > 0.99) return 1;
+        }
+    return 0;
+}
+
 /* row: x, y, z, 1 of the distance of a point from the line through a along t, in the plane across n (unit). */
 static void pti_lock_row(float *row, pti_d3 n, pti_d3 t, pt_vec3 a)
 {
@@ -9764,7 +9786,11 @@ static int pti_lockstep_make(pti_lockstep *k, const pt_scene *scene, pt_vec3 eye
     k->e = (float)(17 * PTI_2_M24 * x);
     k->e_camera = (float)(17 * PTI_2_M24 * from);
     for (i = 0; i < scene->primitive_count; count++) i += pti_lock_collect(scene, i, x, &items[count]);
-    for (j = 0; j < count; j++) items[j].blocks = pti_lock_blocks(&items[j], items, count, (double)k->e);
+    for (j = 0; j < count; j++) {
+        items[j].blocks = pti_lock_blocks(&items[j], items, count, (double)k->e);
+        for (kind = 0; kind < j; kind++)
+            if (pti_lock_wedge(&items[j], &items[kind], 4 * (double)k->e)) return 0;
+    }
     for (kind = 0; kind < PTI_LOCK_CLASSES; kind++) {
         k->begin[kind] = n;
         for (blocks = 1; blocks >= 0; blocks--) {
@@ -10081,8 +10107,8 @@ PTI_INLINE pti_w3 pti_lit3(const pti_lockstep *k, int row, pti_uw light)
 }
 
 /* A point of spheres: in the cone seen from p, or, from inside, in any direction. *q: the point, moved 2 e off to the side
-   of p; density per solid angle. */
-PTI_INLINE pti_fw pti_lock_ball_point(const pti_lockstep *k, pti_uw light, pti_w3 p, const pti_lock_numbers *u, pti_w3 *q)
+   of p; *to: the direction that was drawn, which from 2 e inside the sphere is not that of q; density per solid angle. */
+PTI_INLINE pti_fw pti_lock_ball_point(const pti_lockstep *k, pti_uw light, pti_w3 p, const pti_lock_numbers *u, pti_w3 *q, pti_w3 *to)
 {
     const pti_fw zero = pti_fw_set(0), one = pti_fw_set(1), r = pti_lit(k, PTI_LIT_RADIUS, light);
     const pti_w3 centre = pti_lit3(k, PTI_LIT_P, light), c = pti_w3_sub(centre, p);
@@ -10097,8 +10123,8 @@ PTI_INLINE pti_fw pti_lock_ball_point(const pti_lockstep *k, pti_uw light, pti_w
     axis = pti_w3_select(pti_fw_lt(zero, d), axis, pti_w3_make(zero, zero, one));
     pti_lock_frame(axis, &s, &v);
     pti_lock_turn(u->light1, &cosine, &sinus);
-    w = pti_w3_along(s, pti_fw_mul(sine, cosine), pti_w3_along(v, pti_fw_mul(sine, sinus), pti_w3_scale(axis, pti_fw_sub(one, x))));
-    w = pti_w3_normalize(pti_w3_sub(pti_w3_along(w, t, p), centre));
+    *to = pti_w3_along(s, pti_fw_mul(sine, cosine), pti_w3_along(v, pti_fw_mul(sine, sinus), pti_w3_scale(axis, pti_fw_sub(one, x))));
+    w = pti_w3_normalize(pti_w3_sub(pti_w3_along(*to, t, p), centre));
     *q = pti_w3_along(w, pti_fw_add(r, pti_fw_select(inside, pti_fw_set(-2 * k->e), pti_fw_set(2 * k->e))), centre);
     return pti_fw_div(pti_lit(k, PTI_LIT_DENSITY, light), pti_fw_mul(pti_fw_set((float)(2 * PT_PI)), omc));
 }
@@ -10124,7 +10150,7 @@ PTI_INLINE int pti_lock_direct(const pti_lockstep *k, const pti_lock_surface *s,
     const pti_fw zero = pti_fw_set(0), inverse_pi = pti_fw_set((float)(1 / PT_PI));
     const pti_w3 o = pti_w3_along(s->n, pti_fw_set(2 * k->e), s->p);
     pti_fw number = zero, density, distance2, distance, here, there, p, weight;
-    pti_w3 q, n, w;
+    pti_w3 q, n, w, to;
     pti_mw flat = pti_mw_of_bits(~0u);
     pti_lock_best end;
     pti_uw light;
@@ -10134,7 +10160,7 @@ PTI_INLINE int pti_lock_direct(const pti_lockstep *k, const pti_lock_surface *s,
     density = pti_lock_flat_point(k, light, u, &q, &n);
     if (k->sphere_lights) {
         pti_w3 ball;
-        const pti_fw per_angle = pti_lock_ball_point(k, light, o, u, &ball);
+        const pti_fw per_angle = pti_lock_ball_point(k, light, o, u, &ball, &to);
         flat = pti_fw_le(pti_lit(k, PTI_LIT_RADIUS, light), zero);
         q = pti_w3_select(flat, q, ball);
         density = pti_fw_select(flat, density, per_angle);
@@ -10143,7 +10169,7 @@ PTI_INLINE int pti_lock_direct(const pti_lockstep *k, const pti_lock_surface *s,
     distance2 = pti_w3_dot(w, w);
     distance = pti_fw_sqrt(distance2);
     w = pti_w3_scale(w, pti_fw_div(pti_fw_set(1), distance));
-    here = pti_w3_dot(s->n, w);
+    here = pti_w3_dot(s->n, k->sphere_lights ? pti_w3_select(flat, w, to) : w);
     there = pti_fw_sub(zero, pti_w3_dot(n, w));
     p = pti_fw_select(flat, pti_fw_div(pti_fw_mul(density, distance2), there), density);
     active = pti_mw_and(active, pti_mw_and(pti_fw_lt(zero, here), pti_fw_lt(zero, p)));
