@@ -9646,7 +9646,9 @@ static int pti_lock_wedge(const pti_lock_item *a, const pti_lock_item *b, double
         for (j = 0; j < b->corners; j++) {
             const pti_d3 t = pti_d_normalize(pti_d_between(b->c[j], b->c[(j + 1) % b->corners]));
             const pti_d3 p = pti_d_between(b->c[j], a->c[i]), q = pti_d_between(b->c[j], a->c[(i + 1) % a->corners]);
+            const double x = pti_d_dot(p, t), y = pti_d_dot(q, t), end = pti_d_dot(pti_d_between(b->c[j], b->c[(j + 1) % b->corners]), t);
             if (pti_d_length(pti_d_cross(p, t)) > e || pti_d_length(pti_d_cross(q, t)) > e) continue;
+            if (fmin(fmax(x, y), end) - fmax(fmin(x, y), 0) < e) continue; /* one beside the other */
             for (k = 0; k < 2; k++) {
                 const pti_lock_item *s = k ? b : a;
                 const pti_d3 d = pti_d_between(b->c[j], s->c[((k ? j : i) + 2) % s->corners]);
