@@ -911,7 +911,6 @@ typedef struct pt_wide {
     uint32_t triangles;      /* primitives below this number are triangles                                 */
     int plane_blocks, sphere_blocks; /* a small scene has these instead of a tree                          */
     float extent;            /* the largest coordinate, in magnitude                                       */
-    pt_vec3 lo, hi;
 } pt_wide;
 #endif
 
@@ -4059,14 +4058,15 @@ PTI_INLINE void pti_parallelogram_corners(const pt_parallelogram *s, pt_vec3 v[4
 }
 
 /* A parallelogram is two triangles that share the diagonal from the corner; u and v are the weights of its
-   edges, u >= v in the first triangle. */
+   edges, u >= v in the first triangle. Rounded corners may fold it, so that a ray meets both: then the first decides, also
+   where it is beyond tmax, so that the answer does not depend on what was tested before. */
 static int pti_parallelogram(const pti_ray *r, const pt_vec3 c[4], double tmax, int clear, double *t, double *u, double *v)
 {
     double b1, b2;
-    if (pti_triangle(r, &c[0], &c[1], &c[2], tmax, clear, t, &b1, &b2)) {
+    if (pti_triangle(r, &c[0], &c[1], &c[2], HUGE_VAL, clear, t, &b1, &b2)) {
         *u = b1 + b2;
         *v = b2;
-        return 1;
+        return *t < tmax;
     }
     if (pti_triangle(r, &c[0], &c[2], &c[3], tmax, clear, t, &b1, &b2)) {
         *u = b1;
@@ -4747,8 +4747,11 @@ static int pti_traverse(const pt_scene *scene, const pti_ray *r, pti_best *best,
    rounding costs time, never a hit: the wide tree, the binary tree and the linear search agree, and a lane may use
    fused multiply-adds where there are some.
 
-   Below, u = 2^-24 is the roundoff of float: each operation is off by u of its result. Products may underflow, and
-   numbers below 2^-126 count as zero in some modes of processors: for these each bound holds PTI_TINY.
+   Below, u = 2^-24 is the roundoff of float: each operation is off by u of its result. S is a length that no coordinate of
+   a ray's origin and of the scene exceeds, and no way between them along an axis. It is kept between 2^-16 and 2^40: then no
+   product of three lengths, 24 S^3 at most, overflows, and every bound is so far above 2^-126, the smallest of them
+   160 (1.1 u S)^3, that what underflows, or counts as zero in some modes of processors, does not matter. Scenes that are
+   smaller than 2^-24 or larger than 2^39 get the tree of [PT-07].
 
    What makes it fast [Wal08], [Yli17], in the order of what each gave: nodes of eight children, so that a ray visits a
    third of the nodes and tests their boxes at the price of one; leaves of eight triangles, stored as rows of lanes; nodes and
@@ -4758,7 +4761,8 @@ static int pti_traverse(const pt_scene *scene, const pti_ray *r, pti_best *best,
 #if PTI_HAS_WIDE
 
 #define PTI_U 5.9604644775390625e-8f
-#define PTI_TINY 9.4039548e-38f /* 2^-123 */
+#define PTI_LEAST_SPAN 1.52587891e-5f
+#define PTI_MOST_SPAN 1.09951163e12f
 
 /* Nodes and leaves lie in an arena of lines of 64 bytes, as the cache has them. A reference is the number of a line times 8,
    plus what lies there; without that it is the offset in bytes over 8. */
@@ -5159,12 +5163,9 @@ static int pti_build_wide_tree(const pt_scene *scene, pt_wide *wide, uint32_t tr
         ok = b.used / 64 < (size_t)1 << 29 && pti_alloc_arena(wide, b.used, user);
     }
     if (ok) {
-        const float *lo = b.nodes[0].lo, *hi = b.nodes[0].hi;
         b.arena = wide->arena;
         b.used = 0;
         wide->root = pti_write_tree(&b, 0);
-        wide->lo = pt_v3(lo[0], lo[1], lo[2]);
-        wide->hi = pt_v3(hi[0], hi[1], hi[2]);
     }
     pti_free(memory, user);
     return ok;
@@ -5173,7 +5174,7 @@ static int pti_build_wide_tree(const pt_scene *scene, pt_wide *wide, uint32_t tr
 /* A RAY for lanes, with what bounds their errors. */
 typedef struct pti_ray8 {
     float o[3], d[3];
-    float span;             /* S: no coordinate of o or of the scene, no way between them along an axis is larger */
+    float span;             /* S                                                                           */
     float reach;            /* m: all |d| together                                                         */
     double unit;            /* t unit is the t of d above                                                  */
     /* for a tree: boxes, t = face * inverse + near (or far), and offsets of the rows of faces */
@@ -5184,8 +5185,8 @@ typedef struct pti_ray8 {
     float sx, sy, by_depth, by_origin;
 } pti_ray8;
 
-/* 0: a ray that is not finite or from beyond 2^80: the linear search takes it. A direction far from length 1 is measured in
-   its longest component, so that 1/d does not overflow. */
+/* 0: a ray that is not finite or from beyond 2^40: the linear search takes it. A direction far from length 1 is measured in
+   its longest component, so that o/d does not overflow. */
 PTI_INLINE int pti_ray8_make(pti_ray8 *w, const pti_ray *r, float extent)
 {
     int k;
@@ -5195,25 +5196,26 @@ PTI_INLINE int pti_ray8_make(pti_ray8 *w, const pti_ray *r, float extent)
     }
     w->unit = 1;
     w->reach = fabsf(w->d[0]) + fabsf(w->d[1]) + fabsf(w->d[2]);
-    w->span = fabsf(w->o[0]) + fabsf(w->o[1]) + fabsf(w->o[2]) + extent + 1e-30f;
-    if (!(w->reach > 1e-12f && w->reach < 1e12f)) {
+    w->span = fabsf(w->o[0]) + fabsf(w->o[1]) + fabsf(w->o[2]) + extent + PTI_LEAST_SPAN;
+    if (!(w->reach > 1e-6f && w->reach < 1e6f)) {
         w->unit = fabs(r->d[r->kz]);
         for (k = 0; k < 3; k++) w->d[k] = (float)(r->d[k] / w->unit);
         w->reach = fabsf(w->d[0]) + fabsf(w->d[1]) + fabsf(w->d[2]);
         if (!(w->reach < 4)) return 0; /* nor is NaN */
     }
-    return w->span < 1.2e24f;
+    return w->span < PTI_MOST_SPAN && r->end == r->end;
 }
 
 /* One axis of boxes [Ize13]: with q = 1/d as rounded, face * q - o * q is off by at most 5 u (|t| + |o q|), and |t| up to the
-   end of the scene is at most S |q|. A direction so flat that q would overflow is taken as 2^-60 m, and the far face put off
-   by what it can move until then. */
+   end of the scene is at most S |q|. A direction so flat that q might overflow is taken as f = 2^-26 m, m the 1-norm of d: until
+   the end of the scene, at t <= 3 S / m, the ray moves by at most f t, so near faces come no later, and far ones are put off by
+   2 t. Both are less than the error of the faces themselves. */
 PTI_INLINE void pti_ray8_axis(pti_ray8 *w, unsigned k)
 {
-    const float flat = w->reach * 8.67361738e-19f;
+    const float flat = w->reach * 1.49011612e-8f;
     const int is_flat = fabsf(w->d[k]) < flat;
     const float q = 1 / (is_flat ? flat : w->d[k]), from = -w->o[k] * q;
-    const float off = (12 * PTI_U * w->span + PTI_TINY) * fabsf(q) + (is_flat ? 8 * w->span / w->reach : 0);
+    const float off = 12 * PTI_U * w->span * fabsf(q) + (is_flat ? 7 * w->span / w->reach : 0);
     w->inverse[k] = q;
     w->near[k] = from - off;
     w->far[k] = from + off;
@@ -5234,7 +5236,7 @@ PTI_INLINE void pti_ray8_for_tree(pti_ray8 *w, const pti_ray *r)
     w->sy = (float)r->sy;
     skew = fabsf(w->sx) > fabsf(w->sy) ? fabsf(w->sx) : fabsf(w->sy);
     w->by_depth = 4 * 4.2f * PTI_U * skew;
-    w->by_origin = 4 * (1.1f * PTI_U * (1 + skew) * w->span + PTI_TINY);
+    w->by_origin = 4 * 1.1f * PTI_U * (1 + skew) * w->span;
 }
 
 /* A limit of t in units of w->d, rounded up, finite; and a time that is certainly before it. */
@@ -5332,7 +5334,7 @@ PTI_INLINE unsigned pti_triangle_lanes(const pti_triangle8 *p, const pti_ray *r,
 {
     const pti_edges8 e = pti_edge_lanes(p, r, w);
     const pti_f8 zero = pti_f8_set(0), one_side = pti_f8_max(pti_f8_add(e.low, e.error), pti_f8_sub(e.error, e.high));
-    unsigned lanes = pti_m8_bits(pti_f8_le(pti_f8_set(-PTI_TINY), one_side));
+    unsigned lanes = pti_m8_bits(pti_f8_le(zero, one_side));
     if (lanes) {
         pti_f8 off;
         const pti_f8 t = pti_depth_lanes(&e, r, w, &off);
@@ -5567,7 +5569,7 @@ static void pti_write_plane(pti_plane8 *out, uint32_t i, const pt_vec3 *c, int c
 }
 
 /* Lane `lane` from primitive i on; how many it takes. */
-static uint32_t pti_write_flat(const pt_scene *scene, pti_small *out, uint32_t lane, uint32_t i, uint32_t flats, double extent)
+static uint32_t pti_write_flat(const pt_scene *scene, pti_small *out, uint32_t lane, uint32_t i, uint32_t flats)
 {
     pti_tested *a = &out->tested[lane], *b = &out->tested[PTI_SMALL + lane];
     pti_plane8 *plane = &out->planes[lane / 8];
@@ -5577,7 +5579,7 @@ static uint32_t pti_write_flat(const pt_scene *scene, pti_small *out, uint32_t l
     a->corners = pti_corners(scene, &scene->primitives[a->id], a->corner);
     *b = *a;
     if (a->corners == 3 && i + 1 < flats && pti_corners(scene, &scene->primitives[i + 1], b->corner) == 3 &&
-        pti_is_parallelogram(a->corner, b->corner, extent, all)) {
+        pti_is_parallelogram(a->corner, b->corner, (double)scene->wide.extent, all)) {
         b->id++;
         pti_write_plane(plane, lane % 8, all, 4, 1);
         return 2;
@@ -5591,21 +5593,12 @@ static uint32_t pti_write_flat(const pt_scene *scene, pti_small *out, uint32_t l
 static int pti_build_small(const pt_scene *scene, pt_wide *wide, uint32_t flats)
 {
     const uint32_t count = scene->primitive_count;
-    pti_bounds box = pti_bounds_empty();
     pti_small *out;
     uint32_t i, lane = 0;
-    double extent;
-    for (i = 0; i < count; i++) {
-        pti_primitive_box(scene, &scene->primitives[i], &wide->lo, &wide->hi);
-        pti_bounds_add(&box, wide->lo, wide->hi);
-    }
-    wide->lo = pt_v3((pt_real)box.lo[0], (pt_real)box.lo[1], (pt_real)box.lo[2]);
-    wide->hi = pt_v3((pt_real)box.hi[0], (pt_real)box.hi[1], (pt_real)box.hi[2]);
-    extent = fmax(pti_max3(box.lo[0], box.lo[1], box.lo[2]), pti_max3(box.hi[0], box.hi[1], box.hi[2]));
     if (!pti_alloc_arena(wide, sizeof *out, scene->alloc_user)) return 0;
     out = (pti_small *)(void *)wide->arena;
     for (i = 0; i < PTI_SMALL; i++) out->tag[i] = i;
-    for (i = 0; i < flats || lane % 8 > 0; lane++) i += pti_write_flat(scene, out, lane, i, flats, extent);
+    for (i = 0; i < flats || lane % 8 > 0; lane++) i += pti_write_flat(scene, out, lane, i, flats);
     wide->plane_blocks = (int)(lane / 8);
     for (i = 0; flats + i < count || i % 8 > 0; i++, lane++) {
         const uint32_t id = flats + i < count ? flats + i : count - 1;
@@ -5617,21 +5610,20 @@ static int pti_build_small(const pt_scene *scene, pt_wide *wide, uint32_t flats)
     return 1;
 }
 
-/* What pt_commit calls: 1, or 0 without memory, or -1 if there are more than 2^29 lanes. */
+/* What pt_commit calls: 1, or 0 without memory, or -1 if there are more than 2^29 lanes, or numbers too small or large. */
 static int pti_build_wide(const pt_scene *scene, pt_wide *wide)
 {
+    const double low = pti_max3((double)scene->lo.x, (double)scene->lo.y, (double)scene->lo.z);
+    const double high = pti_max3((double)scene->hi.x, (double)scene->hi.y, (double)scene->hi.z);
     uint32_t count[3] = {0, 0, 0}, flats, i;
-    double extent;
-    int built;
     memset(wide, 0, sizeof *wide);
+    wide->extent = (float)fmax(low, high);
     for (i = 0; i < scene->primitive_count; i++) count[scene->primitives[i].shape]++;
     flats = count[PT_SHAPE_TRIANGLE] + count[PT_SHAPE_PARALLELOGRAM];
     if ((size_t)scene->primitive_count + count[PT_SHAPE_PARALLELOGRAM] > (size_t)1 << 29) return -1;
-    if ((flats + 7) / 8 + (count[PT_SHAPE_SPHERE] + 7) / 8 <= PTI_SMALL / 8) built = pti_build_small(scene, wide, flats);
-    else built = pti_build_wide_tree(scene, wide, count[PT_SHAPE_TRIANGLE], 2 * count[PT_SHAPE_PARALLELOGRAM]);
-    extent = pti_max3((double)wide->lo.x, (double)wide->lo.y, (double)wide->lo.z);
-    wide->extent = (float)fmax(extent, pti_max3((double)wide->hi.x, (double)wide->hi.y, (double)wide->hi.z));
-    return built;
+    if (!(wide->extent > PTI_LEAST_SPAN / 256 && wide->extent < PTI_MOST_SPAN / 2)) return -1;
+    if ((flats + 7) / 8 + (count[PT_SHAPE_SPHERE] + 7) / 8 <= PTI_SMALL / 8) return pti_build_small(scene, wide, flats);
+    return pti_build_wide_tree(scene, wide, count[PT_SHAPE_TRIANGLE], 2 * count[PT_SHAPE_PARALLELOGRAM]);
 }
 
 /* rows[0] x + rows[1] y + rows[2] z + w */
@@ -5694,6 +5686,9 @@ PTI_INLINE pti_f8 pti_f8_tag(pti_f8 x, const uint32_t *tag, pti_m8 m)
 #endif
 }
 
+/* The latest start of what is hit by a limit: 127 units of the last place are at most 2^-16 of it. */
+PTI_INLINE float pti_last_start(float limit) { return limit + limit * (256 * PTI_U); }
+
 /* Where the lanes begin, block by block. The lowest seven bits of a start are the entry that is to be tested: so no two are
    equal, and the least of them says who it is. */
 typedef struct pti_starts {
@@ -5726,7 +5721,7 @@ PTI_INLINE int pti_test_start(const pt_scene *scene, const pti_ray *r, const pti
     if (e->corners == 0) return pti_test(scene, r, e->id, best);
     error = s->error[at % PTI_SMALL / 8].v[at % 8];
     clear = 4 * error * (w->span / w->reach);
-    hit = pti_test_flat(r, e->corner, e->corners, e->id, start > clear && start + clear < pti_ray8_before(limit), best);
+    hit = pti_test_flat(r, e->corner, e->corners, e->id, start > clear && pti_last_start(start) + clear < pti_ray8_before(limit), best);
     if (fabsf(s->more[at % PTI_SMALL / 8].v[at % 8]) > 2 * error) return hit;
     e = &small->tested[at ^ PTI_SMALL];
     return hit | pti_test_flat(r, e->corner, e->corners, e->id, 0, best);
@@ -5740,7 +5735,7 @@ PTI_INLINE int pti_search_small(const pt_scene *scene, const pti_ray *r, const p
     const pti_f8 zero = pti_f8_set(0);
     pti_f8 least = pti_f8_set(HUGE_VALF), margin = zero;
     pti_starts s;
-    float start, limit = end;
+    float start, limit = pti_last_start(end);
     int found = 0, i;
     for (i = 0; i < planes; i++) {
         const pti_planes8 h = pti_plane_lanes(&small->planes[i], w, end, any);
@@ -5760,7 +5755,7 @@ PTI_INLINE int pti_search_small(const pt_scene *scene, const pti_ray *r, const p
         if (!pti_test_start(scene, r, w, &s, start, end, best)) continue;
         if (any) return 1;
         found = 1;
-        limit = pti_ray8_limit(w, best->t);
+        limit = pti_last_start(pti_ray8_limit(w, best->t));
     }
     return found;
 }
@@ -7719,57 +7714,66 @@ static int pti_commit_primitives(pt_scene *scene)
     return 1;
 }
 
-/* Widens a box by what rounding the origin of a ray that starts in the scene may move it: u times the largest
-   coordinate, and as much for each of the two roundings here. */
-static void pti_widen(pt_vec3 *lo, pt_vec3 *hi, const pti_bounds *all)
+/* Up to this many primitives are tested one by one: there a tree does not pay (make bench). */
+#define PTI_LINEAR_MAX 4
+
+static void pti_find_bounds(pt_scene *scene)
 {
-    pt_real e[3];
-    int k;
-    for (k = 0; k < 3; k++) e[k] = (pt_real)(3 * PTI_UNIT_ROUNDOFF * fmax(fabs(all->lo[k]), fabs(all->hi[k])));
-    *lo = pt_v3(lo->x - e[0], lo->y - e[1], lo->z - e[2]);
-    *hi = pt_v3(hi->x + e[0], hi->y + e[1], hi->z + e[2]);
+    uint32_t i;
+    pti_primitive_box(scene, &scene->primitives[0], &scene->lo, &scene->hi);
+    for (i = 1; i < scene->primitive_count; i++) {
+        pt_vec3 lo, hi;
+        pti_primitive_box(scene, &scene->primitives[i], &lo, &hi);
+        scene->lo = pti_lower(lo, scene->lo);
+        scene->hi = pti_upper(hi, scene->hi);
+    }
 }
 
-/* Bounds of the scene, and the binary tree if it is wanted. */
-static int pti_commit_binary(pt_scene *scene, int wanted)
+#if PTI_HAS_BVH
+/* Widens a box by what rounding the origin of a ray that starts in the scene may move it: u times the largest
+   coordinate, and as much for each of the two roundings here. */
+static void pti_widen(const pt_scene *scene, pt_vec3 *lo, pt_vec3 *hi)
 {
-    uint32_t n = scene->primitive_count, i;
+    const pt_vec3 a = scene->lo, b = scene->hi;
+    const pt_vec3 e = pt_v3((pt_real)(3 * PTI_UNIT_ROUNDOFF * fmax(fabs((double)a.x), fabs((double)b.x))),
+                            (pt_real)(3 * PTI_UNIT_ROUNDOFF * fmax(fabs((double)a.y), fabs((double)b.y))),
+                            (pt_real)(3 * PTI_UNIT_ROUNDOFF * fmax(fabs((double)a.z), fabs((double)b.z))));
+    *lo = pt_v3_sub(*lo, e);
+    *hi = pt_v3_add(*hi, e);
+}
+
+static int pti_commit_binary(pt_scene *scene)
+{
+    const uint32_t n = scene->primitive_count;
     pt_vec3 *boxes = (pt_vec3 *)pti_alloc(2 * (size_t)n, sizeof *boxes, scene->alloc_user);
-    pti_bounds all = pti_bounds_empty();
+    uint32_t i;
     int ok = boxes != NULL;
-    (void)wanted;
     for (i = 0; ok && i < n; i++) {
         pti_primitive_box(scene, &scene->primitives[i], &boxes[i], &boxes[n + i]);
-        pti_bounds_add(&all, boxes[i], boxes[n + i]);
+        pti_widen(scene, &boxes[i], &boxes[n + i]);
     }
-    for (i = 0; ok && i < n; i++) pti_widen(&boxes[i], &boxes[n + i], &all);
-    if (n > 0) {
-        scene->lo = pt_v3((pt_real)all.lo[0], (pt_real)all.lo[1], (pt_real)all.lo[2]);
-        scene->hi = pt_v3((pt_real)all.hi[0], (pt_real)all.hi[1], (pt_real)all.hi[2]);
-    }
-#if PTI_HAS_BVH
-    if (ok && wanted) ok = pt_bvh_build(&scene->bvh, boxes, boxes + n, n, scene->alloc_user) == PT_OK;
-#endif
+    ok = ok && pt_bvh_build(&scene->bvh, boxes, boxes + n, n, scene->alloc_user) == PT_OK;
     pti_free(boxes, scene->alloc_user);
     return ok;
 }
-
-/* Up to this many primitives are tested one by one: there a tree does not pay (make bench). */
-#define PTI_LINEAR_MAX 4
+#endif
 
 /* Bounds and a tree, if it pays. */
 static int pti_commit_tree(pt_scene *scene)
 {
     const int wanted = scene->primitive_count > PTI_LINEAR_MAX && scene->tree != PT_TREE_NONE;
+    if (scene->primitive_count > 0) pti_find_bounds(scene);
 #if PTI_HAS_WIDE
     if (wanted && scene->tree == PT_TREE_DEFAULT) {
         const int built = pti_build_wide(scene, &scene->wide);
-        scene->lo = scene->wide.lo;
-        scene->hi = scene->wide.hi;
         if (built >= 0) return built;
     }
 #endif
-    return pti_commit_binary(scene, wanted);
+#if PTI_HAS_BVH
+    if (wanted) return pti_commit_binary(scene);
+#endif
+    (void)wanted;
+    return 1;
 }
 
 /* Power of a light for its share of the samples: pi A L seen from one side, 4 pi I, that of a spot; from infinity
