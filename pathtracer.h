@@ -2439,6 +2439,13 @@ PTI_INLINE pti_f8 pti_f8_madd(pti_f8 x, pti_f8 y, pti_f8 z) { return pti_f8_add(
 PTI_INLINE pti_f8 pti_f8_nmadd(pti_f8 x, pti_f8 y, pti_f8 z) { return pti_f8_sub(z, pti_f8_mul(x, y)); }
 #endif
 
+/* Of long functions of lanes: loops in C, inlined by the hundred, take compilers seconds. */
+#if PTI_LANES > 0
+#define PTI_INLINE8 PTI_INLINE
+#else
+#define PTI_INLINE8 static
+#endif
+
 /* Lanes as numbers. */
 typedef union pti_lanes {
     pti_f8 f;
@@ -5255,7 +5262,7 @@ PTI_INLINE pti_f8 pti_row(const void *p, unsigned offset)
 }
 
 /* The children whose boxes the ray may meet by the limit, and where they begin. */
-PTI_INLINE unsigned pti_node_lanes(const pti_node8 *n, const pti_ray8 *w, float limit, pti_lanes *begin)
+PTI_INLINE8 unsigned pti_node_lanes(const pti_node8 *n, const pti_ray8 *w, float limit, pti_lanes *begin)
 {
     const pti_f8 qx = pti_f8_set(w->inverse[0]), qy = pti_f8_set(w->inverse[1]), qz = pti_f8_set(w->inverse[2]);
     const pti_f8 near_x = pti_f8_madd(pti_row(n->box, w->near_row[0]), qx, pti_f8_set(w->near[0]));
@@ -5287,7 +5294,7 @@ typedef struct pti_edges8 {
    With s the larger |shear|, r = u |o| for the rounding of the origin, and Z the largest |z|, a sheared x = c.x - s z is off
    by at most D = u (4 s Z + 2 |x|) + (1 + s) r: two differences, the shear and a product, each rounded once. The four factors
    of an edge function are at most M = |x| + D, or |y| + D, so it is off by at most E = 4 M (D + u M). */
-PTI_INLINE pti_edges8 pti_edge_lanes(const pti_triangle8 *p, const pti_ray *r, const pti_ray8 *w)
+PTI_INLINE8 pti_edges8 pti_edge_lanes(const pti_triangle8 *p, const pti_ray *r, const pti_ray8 *w)
 {
     const pti_f8 ox = pti_f8_set(w->o[r->kx]), oy = pti_f8_set(w->o[r->ky]), oz = pti_f8_set(w->o[r->kz]);
     const pti_f8 sx = pti_f8_set(w->sx), sy = pti_f8_set(w->sy);
@@ -5317,7 +5324,7 @@ PTI_INLINE pti_edges8 pti_edge_lanes(const pti_triangle8 *p, const pti_ray *r, c
 /* t = (U a.z + V b.z + W c.z) / (U + V + W) / d.z, and *off, the bound of its error. z is off by u Z + r, and U, V, W weigh depths
    that are at most e apart, so it is off by F + E (3 e + 10 F) / |U + V + W|, all over |d.z|, with F = 13 u Z + r, the roundings
    of this sum and of 1/d.z included. */
-PTI_INLINE pti_f8 pti_depth_lanes(const pti_edges8 *e, const pti_ray *r, const pti_ray8 *w, pti_f8 *off)
+PTI_INLINE8 pti_f8 pti_depth_lanes(const pti_edges8 *e, const pti_ray *r, const pti_ray8 *w, pti_f8 *off)
 {
     const pti_f8 inverse = pti_f8_div(pti_f8_set(w->inverse[r->kz]), pti_f8_add(e->u, pti_f8_add(e->v, e->w)));
     const pti_f8 depth = pti_f8_madd(e->u, e->az, pti_f8_madd(e->v, e->bz, pti_f8_mul(e->w, e->cz)));
@@ -5354,7 +5361,7 @@ PTI_INLINE unsigned pti_triangle_lanes(const pti_triangle8 *p, const pti_ray *r,
    The foot of the perpendicular from the centre is l = f + b d with f = o - c and b = -f.d / d.d. f is off by 2 u S a
    coordinate and b |d| by 31 u S, along the ray; so |l| is off by at most 47 u S, and with the radius r + 64 u S both the
    question and the half chord are on the safe side; 48 u S more cover b. */
-PTI_INLINE pti_f8 pti_sphere_lanes(const pti_sphere8 *p, const pti_ray8 *w)
+PTI_INLINE8 pti_f8 pti_sphere_lanes(const pti_sphere8 *p, const pti_ray8 *w)
 {
     const pti_f8 dx = pti_f8_set(w->d[0]), dy = pti_f8_set(w->d[1]), dz = pti_f8_set(w->d[2]), zero = pti_f8_set(0);
     const pti_f8 fx = pti_f8_sub(pti_f8_set(w->o[0]), pti_f8_load(p->centre[0]));
@@ -5641,7 +5648,7 @@ typedef struct pti_planes8 {
 /* n.o + n3 is off by 36 u S (9 of these for the rounded corners of a parallelogram), n.d by 14 u m, so t by X = 96 u S / |n.d|.
    As |n.d| <= m, m X is at least 96 u S: so u, v and w are off by at most 3 G m X. Nothing is said of a lane where n is
    not known or where numbers overflow: NaN is not < 0. */
-PTI_INLINE pti_planes8 pti_plane_lanes(const pti_plane8 *p, const pti_ray8 *w, float limit, int any)
+PTI_INLINE8 pti_planes8 pti_plane_lanes(const pti_plane8 *p, const pti_ray8 *w, float limit, int any)
 {
     const pti_f8 ox = pti_f8_set(w->o[0]), oy = pti_f8_set(w->o[1]), oz = pti_f8_set(w->o[2]), zero = pti_f8_set(0);
     const pti_f8 dx = pti_f8_set(w->d[0]), dy = pti_f8_set(w->d[1]), dz = pti_f8_set(w->d[2]), one = pti_f8_set(1);

@@ -343,14 +343,14 @@ static void search_three_ways(int kind, int count, pt_vec3 at, double scale, int
     int ok = make(&wide, kind, count, at, scale, PT_TREE_DEFAULT);
     ok = make(&binary, kind, count, at, scale, PT_TREE_BINARY) && ok;
     ok = make(&none, kind, count, at, scale, PT_TREE_NONE) && ok;
-    if (ok && none.primitive_count > 0) {
+    if (ok && none.primitive_count > PTI_LINEAR_MAX) {
         const char *name = label("%s, %u primitives", NAMES[kind], none.primitive_count);
         while (sum.rays < rays) {
             const pt_ray ray = draw_ray(&none, &rng, at, scale);
             compare_around(s, &ray, &rng, &sum);
         }
-        pt_check(wide.wide.bytes > 0 || wide.primitive_count <= PTI_LINEAR_MAX || !lanes_serve(&wide), name, "has no lanes: the check is empty");
-        pt_check(sum.hits > sum.rays / 100, name, "size %g: only %d of %d rays hit: the check is empty", scale, sum.hits, sum.rays);
+        pt_check(wide.wide.bytes > 0 || !lanes_serve(&wide), name, "has no lanes: the check is empty");
+        pt_check(sum.hits > sum.rays / 100 || pt_test.is_short, name, "size %g: only %d of %d rays hit: the check is empty", scale, sum.hits, sum.rays);
         pt_check(sum.other == 0, name, "size %g: %d of %d rays find another hit than the linear search", scale, sum.other, sum.rays);
         pt_check(sum.blind == 0, name, "size %g: pt_occluded differs from the linear search for %d of %d rays", scale, sum.blind, sum.rays);
         pt_check(memcmp(&wide.lo, &none.lo, sizeof none.lo) == 0 && memcmp(&wide.hi, &none.hi, sizeof none.hi) == 0, name, "other bounds");
@@ -365,15 +365,15 @@ static void small_scenes(void)
     static const int sizes[9] = {5, 7, 8, 9, 16, 21, 33, 48, 64};
     int kind, i;
     for (kind = 0; kind < KINDS; kind++)
-        for (i = 0; i < 9; i++) search_three_ways(kind, sizes[i], v3(0, 0, 0), 1, (int)pt_test_samples(3000), 200 + (uint64_t)i);
+        for (i = 0; i < 9; i++) search_three_ways(kind, sizes[i], v3(0, 0, 0), 1, (int)pt_test_samples(1000), 200 + (uint64_t)i);
 }
 
 static void trees(void)
 {
     int kind;
     for (kind = 0; kind < KINDS; kind++) {
-        search_three_ways(kind, 100, v3(0, 0, 0), 1, (int)pt_test_samples(6000), 300);
-        search_three_ways(kind, 1500, v3(0, 0, 0), 1, (int)pt_test_samples(2000), 301);
+        search_three_ways(kind, 100, v3(0, 0, 0), 1, (int)pt_test_samples(2000), 300);
+        search_three_ways(kind, 1500, v3(0, 0, 0), 1, (int)pt_test_samples(600), 301);
     }
 }
 
@@ -384,15 +384,15 @@ static void scales(void)
     int i, kind;
     for (kind = 0; kind < KINDS; kind += kind < MIXED ? 1 : 3)
         for (i = 0; i < 8; i++) {
-            search_three_ways(kind, 40, v3(0, 0, 0), size[i], (int)pt_test_samples(1500), 400 + (uint64_t)i);
-            search_three_ways(kind, 150, v3(0, 0, 0), size[i], (int)pt_test_samples(1500), 410 + (uint64_t)i);
+            search_three_ways(kind, 40, v3(0, 0, 0), size[i], (int)pt_test_samples(500), 400 + (uint64_t)i);
+            search_three_ways(kind, 150, v3(0, 0, 0), size[i], (int)pt_test_samples(500), 410 + (uint64_t)i);
         }
     for (i = 0; i < 4; i++) {
         const double away = pow(10, 1 + 1.5 * i);
         for (kind = 0; kind < KINDS; kind += kind < MIXED ? 1 : 2) {
             if (kind == CHAIN || (kind == SLIVERS && i > 2)) continue;
-            search_three_ways(kind, 40, v3(away, -0.3 * away, 0.01 * away), 1, (int)pt_test_samples(1500), 420 + (uint64_t)i);
-            search_three_ways(kind, 150, v3(away, -0.3 * away, 0.01 * away), 1, (int)pt_test_samples(1500), 430 + (uint64_t)i);
+            search_three_ways(kind, 40, v3(away, -0.3 * away, 0.01 * away), 1, (int)pt_test_samples(500), 420 + (uint64_t)i);
+            search_three_ways(kind, 150, v3(away, -0.3 * away, 0.01 * away), 1, (int)pt_test_samples(500), 430 + (uint64_t)i);
         }
     }
 }
@@ -503,7 +503,7 @@ static void bounds_of_triangles(void)
     }
     printf("bounds of triangles: largest error / bound %.3f of %d edges, %.3f of %d depths; %d hits known in float\n", sum.edge,
            3 * sum.edges, sum.depth, sum.depths, sum.sure);
-    pt_check(sum.edges > 10000 && sum.depths > 500 && sum.sure > 200, "bounds of triangles", "the check is empty");
+    pt_check((sum.edges > 10000 && sum.depths > 500 && sum.sure > 200) || pt_test.is_short, "bounds of triangles", "the check is empty");
     pt_check(sum.edge <= 1, "error of edge functions", "%.3f times its bound", sum.edge);
     pt_check(sum.depth <= 1, "error of depths", "%.3f times its bound", sum.depth);
     pt_check((sum.edge > 0.02 && sum.depth > 0.02) || pt_test.is_short, "bounds of triangles", "far too wide");
@@ -556,7 +556,7 @@ static void bounds_of_planes(void)
         pt_scene_free(&s);
     }
     printf("bounds of planes: largest error / bound %.3f of %d hits; %d hits known in float\n", sum.plane, sum.planes, sum.sure);
-    pt_check(sum.planes > 5000 && sum.sure > 1000, "bounds of planes", "the check is empty");
+    pt_check((sum.planes > 5000 && sum.sure > 1000) || pt_test.is_short, "bounds of planes", "the check is empty");
     pt_check(sum.plane <= 1, "error of weights", "%.4f times its bound", sum.plane);
     pt_check(sum.plane > 0.0005 || pt_test.is_short, "error of weights", "%.4f times its bound, which is far too wide", sum.plane);
     pt_check(sum.wrong == 0, "what lanes tell of planes", "%d are told to begin behind the hit, to be hit, or to be the wrong half", sum.wrong);
