@@ -2427,6 +2427,8 @@ PTI_F8(pti_f8, pti_f8_max, _mm256_max_ps(x, y), _mm_max_ps(x, y), x > y ? x : y)
 PTI_F8(pti_m8, pti_f8_lt, _mm256_cmp_ps(x, y, _CMP_LT_OQ), _mm_cmplt_ps(x, y), x < y ? -1 : 0)
 PTI_F8(pti_m8, pti_f8_le, _mm256_cmp_ps(x, y, _CMP_LE_OQ), _mm_cmple_ps(x, y), x <= y ? -1 : 0)
 PTI_F8(pti_f8, pti_f8_root, _mm256_sqrt_ps(x), _mm_sqrt_ps(x), sqrtf(x))
+PTI_F8(pti_f8, pti_f8_flip, _mm256_xor_ps(x, _mm256_and_ps(y, _mm256_set1_ps(-0.0f))), _mm_xor_ps(x, _mm_and_ps(y, _mm_set1_ps(-0.0f))),
+       y < 0 ? -x : x) /* -x where y is negative */
 PTI_F8(pti_f8, pti_f8_unsign, _mm256_andnot_ps(y, x), _mm_andnot_ps(y, x), fabsf(x)) /* y = -0 */
 PTI_INLINE pti_f8 pti_f8_sqrt(pti_f8 x) { return pti_f8_root(x, x); }
 PTI_INLINE pti_f8 pti_f8_abs(pti_f8 x) { return pti_f8_unsign(x, pti_f8_set(-0.0f)); }
@@ -4019,13 +4021,12 @@ PTI_INLINE double pti_depth_error(const pti_ray *r, pti_d3 a, pti_d3 b, pti_d3 c
     return 3 * (3 * e * edge * z + dedge * z + dz * edge);
 }
 
-/* Of the sheared corners a, b, c: t in (0, tmax) and weights of b and c. clear: t is known to be farther from 0 and from
-   the ray's end than rounding can move it. */
-PTI_INLINE int pti_sheared_triangle(const pti_ray *r, pti_d3 a, pti_d3 b, pti_d3 c, double tmax, int clear, double *t,
-                                    double *b1, double *b2)
+/* Of the sheared corners a, b, c: t in (0, tmax) and weights of b and c. */
+PTI_INLINE int pti_sheared_triangle(const pti_ray *r, pti_d3 a, pti_d3 b, pti_d3 c, double tmax, double *t, double *b1,
+                                    double *b2)
 {
     const double u = pti_edge(c.x, b.y, c.y, b.x), v = pti_edge(a.x, c.y, a.y, c.x), w = pti_edge(b.x, a.y, b.y, a.x);
-    double det, depth, p, q;
+    double det, depth, error, p, q;
     if (pti_signs_differ(u, v, w) && ((u < 0) + (v < 0) + (w < 0)) * ((u > 0) + (v > 0) + (w > 0)) != 0) return 0;
     det = u + v + w;
     if (det == 0) return 0; /* seen edge-on */
@@ -4037,11 +4038,9 @@ PTI_INLINE int pti_sheared_triangle(const pti_ray *r, pti_d3 a, pti_d3 b, pti_d3
     PTI_FENCE(depth);
     depth += p + q;
     if (!(depth / det > 0 && depth / det < tmax)) return 0; /* NaN misses */
-    if (!clear) {
-        const double error = pti_depth_error(r, a, b, c, u, v, w);
-        if (!(fabs(depth) > error)) return 0; /* the origin may lie on it, */
-        if (!(fabs(depth) + error < r->end * fabs(det))) return 0; /* or the end of a shadow ray */
-    }
+    error = pti_depth_error(r, a, b, c, u, v, w);
+    if (!(fabs(depth) > error)) return 0; /* the origin may lie on it, */
+    if (!(fabs(depth) + error < r->end * fabs(det))) return 0; /* or the end of a shadow ray */
     *t = depth / det;
     *b1 = v / det;
     *b2 = w / det;
@@ -4049,9 +4048,9 @@ PTI_INLINE int pti_sheared_triangle(const pti_ray *r, pti_d3 a, pti_d3 b, pti_d3
 }
 
 PTI_INLINE int pti_triangle(const pti_ray *r, const pt_vec3 *v0, const pt_vec3 *v1, const pt_vec3 *v2, double tmax,
-                            int clear, double *t, double *b1, double *b2)
+                            double *t, double *b1, double *b2)
 {
-    return pti_sheared_triangle(r, pti_shear(r, v0), pti_shear(r, v1), pti_shear(r, v2), tmax, clear, t, b1, b2);
+    return pti_sheared_triangle(r, pti_shear(r, v0), pti_shear(r, v1), pti_shear(r, v2), tmax, t, b1, b2);
 }
 
 /* The corners in order, rounded to pt_real as a user's own sums would be: then a neighbour with the same
@@ -4067,15 +4066,15 @@ PTI_INLINE void pti_parallelogram_corners(const pt_parallelogram *s, pt_vec3 v[4
 /* A parallelogram is two triangles that share the diagonal from the corner; u and v are the weights of its
    edges, u >= v in the first triangle. Rounded corners may fold it, so that a ray meets both: then the first decides, also
    where it is beyond tmax, so that the answer does not depend on what was tested before. */
-static int pti_parallelogram(const pti_ray *r, const pt_vec3 c[4], double tmax, int clear, double *t, double *u, double *v)
+static int pti_parallelogram(const pti_ray *r, const pt_vec3 c[4], double tmax, double *t, double *u, double *v)
 {
     double b1, b2;
-    if (pti_triangle(r, &c[0], &c[1], &c[2], HUGE_VAL, clear, t, &b1, &b2)) {
+    if (pti_triangle(r, &c[0], &c[1], &c[2], HUGE_VAL, t, &b1, &b2)) {
         *u = b1 + b2;
         *v = b2;
         return *t < tmax;
     }
-    if (pti_triangle(r, &c[0], &c[2], &c[3], tmax, clear, t, &b1, &b2)) {
+    if (pti_triangle(r, &c[0], &c[2], &c[3], tmax, t, &b1, &b2)) {
         *u = b1;
         *v = b1 + b2;
         return 1;
@@ -4129,7 +4128,7 @@ static int pti_triangle_has_area(pt_vec3 v0, pt_vec3 v1, pt_vec3 v2)
 PTDEF int pt_intersect_triangle(const pt_ray *ray, pt_vec3 v0, pt_vec3 v1, pt_vec3 v2, double *t, double b[2])
 {
     pti_ray r = pti_ray_make(ray);
-    return pti_triangle_has_area(v0, v1, v2) && pti_triangle(&r, &v0, &v1, &v2, (double)ray->tmax, 0, t, &b[0], &b[1]);
+    return pti_triangle_has_area(v0, v1, v2) && pti_triangle(&r, &v0, &v1, &v2, (double)ray->tmax, t, &b[0], &b[1]);
 }
 
 /* A ray made ready for boxes: o and 1/d, rounded; 1/0 = infinity. */
@@ -4291,12 +4290,12 @@ PTI_INLINE int pti_keep(pti_best *best, int i, double t, double u, double v)
 }
 
 /* Tests flat primitive i, of three or four corners, for t in (0, best->t]. */
-static int pti_test_flat(const pti_ray *r, const pt_vec3 *c, int corners, int i, int clear, pti_best *best)
+static int pti_test_flat(const pti_ray *r, const pt_vec3 *c, int corners, int i, pti_best *best)
 {
     const double tmax = pti_before(best, i);
     double t, u, v;
-    return (corners == 3 ? pti_triangle(r, &c[0], &c[1], &c[2], tmax, clear, &t, &u, &v)
-                         : pti_parallelogram(r, c, tmax, clear, &t, &u, &v)) && pti_keep(best, i, t, u, v);
+    return (corners == 3 ? pti_triangle(r, &c[0], &c[1], &c[2], tmax, &t, &u, &v)
+                         : pti_parallelogram(r, c, tmax, &t, &u, &v)) && pti_keep(best, i, t, u, v);
 }
 
 /* Tests primitive i of the scene. */
@@ -4309,7 +4308,7 @@ PTI_INLINE int pti_test(const pt_scene *scene, const pti_ray *r, int i, pti_best
         const pt_sphere *s = &scene->spheres[p->index];
         return pti_sphere(r, s->centre, (double)s->radius, pti_before(best, i), &t) && pti_keep(best, i, t, 0, 0);
     }
-    return pti_test_flat(r, c, pti_corners(scene, p, c), i, 0, best);
+    return pti_test_flat(r, c, pti_corners(scene, p, c), i, best);
 }
 
 /* Error of a point computed in double from terms of magnitude m and then rounded to pt_real. Sixteen
@@ -4972,13 +4971,18 @@ static void pti_build_binary(pti_wide_builder *b, uint32_t n, const pti_joined *
     }
     node->child = 0;
     for (k = 0; k < 7; k++) node->cost[k] = pti_scaled_area(b, all->box.v);
-    if (node->count <= 8 && (n > 0 || b->flats == 0 || b->flats >= end)) return;
+    if (node->count <= 8 && (n > 0 || b->flats == 0 || b->flats >= end)) {
+        if (depth >= 8 || node->count < 2) return;
+        pti_find_parting(b, begin, end, all->centres.v, 1, &p);
+        if (!(p.cost < pti_scaled_area(b, all->box.v))) return;
+    }
     if (pieces && n > 0 && node->count <= b->piece_size && b->piece_count < PTI_PIECES) {
         const pti_piece piece = {n, depth, *all};
         b->pieces[b->piece_count++] = piece;
         return;
     }
-    if (n == 0 && b->flats > 0 && b->flats < end) p.middle = b->flats;
+    if (p.cost < HUGE_VALF) ;
+    else if (n == 0 && b->flats > 0 && b->flats < end) p.middle = b->flats;
     else if (depth < PTI_WIDE_DEPTH) pti_find_parting(b, begin, end, all->centres.v, depth < 8 ? 1 : 4, &p);
     middle = pti_part(b, begin, end, &p, side);
     node->child = (uint32_t)PTI_ADD(&b->next, 2);
@@ -5187,9 +5191,9 @@ typedef struct pti_ray8 {
     /* for a tree: boxes, t = face * inverse + near (or far), and offsets of the rows of faces */
     float inverse[3], near[3], far[3];
     unsigned near_row[3], far_row[3];
-    /* triangles: offsets of the rows of the axes x y z of [PT-06], shear, 4 u s and (1 + s) r of pti_triangle_lanes, times 4 */
+    /* triangles: offsets of the rows of the axes x y z of [PT-06], shear, and errors: D and K below, and that of z */
     unsigned x, y, z;
-    float sx, sy, by_depth, by_origin;
+    float sx, sy, across, edge, along;
 } pti_ray8;
 
 /* 0: a ray that is not finite or from beyond 2^40: the linear search takes it. A direction far from length 1 is measured in
@@ -5242,8 +5246,9 @@ PTI_INLINE void pti_ray8_for_tree(pti_ray8 *w, const pti_ray *r)
     w->sx = (float)r->sx;
     w->sy = (float)r->sy;
     skew = fabsf(w->sx) > fabsf(w->sy) ? fabsf(w->sx) : fabsf(w->sy);
-    w->by_depth = 4 * 4.2f * PTI_U * skew;
-    w->by_origin = 4 * 1.1f * PTI_U * (1 + skew) * w->span;
+    w->across = (3.1f + 7.1f * skew) * PTI_U * w->span;
+    w->edge = (16.1f + 32.1f * skew) * PTI_U * w->span;
+    w->along = 12 * PTI_U * w->span;
 }
 
 /* A limit of t in units of w->d, rounded up, finite; and a time that is certainly before it. */
@@ -5291,9 +5296,10 @@ typedef struct pti_edges8 {
 
 /* As in [PT-06]: corners relative to the origin, sheared; U = c x b, V = a x c, W = b x a.
 
-   With s the larger |shear|, r = u |o| for the rounding of the origin, and Z the largest |z|, a sheared x = c.x - s z is off
-   by at most D = u (4 s Z + 2 |x|) + (1 + s) r: two differences, the shear and a product, each rounded once. The four factors
-   of an edge function are at most M = |x| + D, or |y| + D, so it is off by at most E = 4 M (D + u M). */
+   With s the larger |shear|, a sheared x = c.x - s z is off by at most u (4 s |z| + 2 |x|) for two differences, the shear and a
+   product, each rounded once, and by (1 + s) u |o| for the rounding of the origin: by D = (3 + 7 s) u S in all, as |z| <= S and
+   |x| <= (1 + s) S. With M = X + D, X the largest |x| and |y|, factors of edge functions are at most M, so these are off by
+   4 M (D + u M) <= E = K (X + D), K = (16 + 32 s) u S. */
 PTI_INLINE8 pti_edges8 pti_edge_lanes(const pti_triangle8 *p, const pti_ray *r, const pti_ray8 *w)
 {
     const pti_f8 ox = pti_f8_set(w->o[r->kx]), oy = pti_f8_set(w->o[r->ky]), oz = pti_f8_set(w->o[r->kz]);
@@ -5305,9 +5311,7 @@ PTI_INLINE8 pti_edges8 pti_edge_lanes(const pti_triangle8 *p, const pti_ray *r, 
     const pti_f8 ay = pti_f8_nmadd(sy, az, pti_f8_sub(pti_row(p->v[0], w->y), oy));
     const pti_f8 by = pti_f8_nmadd(sy, bz, pti_f8_sub(pti_row(p->v[3], w->y), oy));
     const pti_f8 cy = pti_f8_nmadd(sy, cz, pti_f8_sub(pti_row(p->v[6], w->y), oy));
-    const pti_f8 far = pti_largest8(az, bz, cz), wide = pti_f8_max(pti_largest8(ax, bx, cx), pti_largest8(ay, by, cy));
-    const pti_f8 d4 = pti_f8_madd(far, pti_f8_set(w->by_depth), pti_f8_madd(wide, pti_f8_set(4 * 2.1f * PTI_U), pti_f8_set(w->by_origin)));
-    const pti_f8 m = pti_f8_madd(d4, pti_f8_set(0.25f), wide);
+    const pti_f8 wide = pti_f8_max(pti_largest8(ax, bx, cx), pti_largest8(ay, by, cy));
     pti_edges8 e;
     e.az = az;
     e.bz = bz;
@@ -5317,22 +5321,22 @@ PTI_INLINE8 pti_edges8 pti_edge_lanes(const pti_triangle8 *p, const pti_ray *r, 
     e.w = pti_edge8(bx, ay, by, ax);
     e.low = pti_f8_min(e.u, pti_f8_min(e.v, e.w));
     e.high = pti_f8_max(e.u, pti_f8_max(e.v, e.w));
-    e.error = pti_f8_mul(m, pti_f8_madd(m, pti_f8_set(4.1f * PTI_U), d4));
+    e.error = pti_f8_madd(wide, pti_f8_set(w->edge), pti_f8_set(w->edge * w->across));
     return e;
 }
 
-/* t = (U a.z + V b.z + W c.z) / (U + V + W) / d.z, and *off, the bound of its error. z is off by u Z + r, and U, V, W weigh depths
-   that are at most e apart, so it is off by F + E (3 e + 10 F) / |U + V + W|, all over |d.z|, with F = 13 u Z + r, the roundings
-   of this sum and of 1/d.z included. */
-PTI_INLINE8 pti_f8 pti_depth_lanes(const pti_edges8 *e, const pti_ray *r, const pti_ray8 *w, pti_f8 *off)
+/* Depth times determinant: t |d.z| |det| and, in *off, what it is off by; *det: |det|. With N = U a.z + V b.z + W c.z and the
+   z of a hit, N - z det is sum dU (a.z - z) + sum U da.z and roundings. Depths are at most e apart, and U, V, W have one sign
+   but for E: so it is off by 3 E e + (|det| + 6 E) 7 u S, and by 4 u |det| S more for the roundings of d, t and the limit. */
+PTI_INLINE8 pti_f8 pti_depth_lanes(const pti_edges8 *e, const pti_ray *r, const pti_ray8 *w, pti_f8 *det, pti_f8 *off)
 {
-    const pti_f8 inverse = pti_f8_div(pti_f8_set(w->inverse[r->kz]), pti_f8_add(e->u, pti_f8_add(e->v, e->w)));
+    const pti_f8 sum = pti_f8_mul(pti_f8_add(e->u, pti_f8_add(e->v, e->w)), pti_f8_set(w->d[r->kz] < 0 ? -1.0f : 1.0f));
     const pti_f8 depth = pti_f8_madd(e->u, e->az, pti_f8_madd(e->v, e->bz, pti_f8_mul(e->w, e->cz)));
     const pti_f8 last = pti_f8_max(e->az, pti_f8_max(e->bz, e->cz)), first = pti_f8_min(e->az, pti_f8_min(e->bz, e->cz));
-    const pti_f8 f = pti_f8_madd(pti_largest8(e->az, e->bz, e->cz), pti_f8_set(13 * PTI_U), pti_f8_set(w->by_origin));
-    const pti_f8 weigh = pti_f8_madd(f, pti_f8_set(10), pti_f8_mul(pti_f8_sub(last, first), pti_f8_set(3.1f)));
-    *off = pti_f8_madd(pti_f8_mul(e->error, weigh), pti_f8_abs(inverse), pti_f8_mul(f, pti_f8_set(fabsf(w->inverse[r->kz]))));
-    return pti_f8_mul(depth, inverse);
+    const pti_f8 weigh = pti_f8_madd(pti_f8_sub(last, first), pti_f8_set(3.1f), pti_f8_set(4 * w->along));
+    *det = pti_f8_abs(sum);
+    *off = pti_f8_madd(e->error, weigh, pti_f8_mul(*det, pti_f8_set(w->along)));
+    return pti_f8_flip(depth, sum);
 }
 
 /* Which of eight triangles may be hit by the limit? *sure, where it is asked for: which certainly are; both bounds are at
@@ -5343,12 +5347,12 @@ PTI_INLINE unsigned pti_triangle_lanes(const pti_triangle8 *p, const pti_ray *r,
     const pti_f8 zero = pti_f8_set(0), one_side = pti_f8_max(pti_f8_add(e.low, e.error), pti_f8_sub(e.error, e.high));
     unsigned lanes = pti_m8_bits(pti_f8_le(zero, one_side));
     if (lanes) {
-        pti_f8 off;
-        const pti_f8 t = pti_depth_lanes(&e, r, w, &off);
-        const pti_f8 over = pti_f8_sub(pti_f8_sub(t, off), pti_f8_set(limit));
-        lanes &= ~pti_m8_bits(pti_f8_lt(zero, over)) & ~pti_m8_bits(pti_f8_lt(pti_f8_add(t, off), zero)); /* NaN may be hit */
+        const float flat = fabsf(w->d[r->kz]);
+        pti_f8 det, off;
+        const pti_f8 depth = pti_depth_lanes(&e, r, w, &det, &off);
+        lanes &= pti_m8_bits(pti_f8_le(pti_f8_sub(depth, off), pti_f8_mul(det, pti_f8_set(limit * flat < 2 * w->span ? limit * flat : 2 * w->span)))) & pti_m8_bits(pti_f8_le(zero, pti_f8_add(depth, off)));
         if (sure) {
-            const pti_f8 clear = pti_f8_min(t, pti_f8_sub(pti_f8_set(pti_ray8_before(limit)), t));
+            const pti_f8 clear = pti_f8_min(depth, pti_f8_sub(pti_f8_mul(det, pti_f8_set(pti_ray8_before(limit) * flat)), depth));
             *sure = pti_m8_bits(pti_f8_lt(e.error, pti_f8_max(e.low, pti_f8_sub(zero, e.high)))) &
                     pti_m8_bits(pti_f8_lt(pti_f8_add(off, off), clear));
         }
@@ -5435,7 +5439,7 @@ PTI_INLINE int pti_test_lane(const pt_scene *scene, const pti_ray *r, const pti_
     double t, u, v;
     if (id >= (int)scene->wide.triangles) return pti_test(scene, r, id, best);
     return pti_sheared_triangle(r, pti_shear_lane(r, &p->v[0][i]), pti_shear_lane(r, &p->v[3][i]), pti_shear_lane(r, &p->v[6][i]),
-                                pti_before(best, id), 0, &t, &u, &v) && pti_keep(best, id, t, u, v);
+                                pti_before(best, id), &t, &u, &v) && pti_keep(best, id, t, u, v);
 }
 
 PTI_INLINE int pti_test_leaf(const pt_scene *scene, uint32_t leaf, const pti_ray *r, const pti_ray8 *w, float limit, pti_best *best, int any)
@@ -5714,24 +5718,20 @@ PTI_INLINE float pti_next_start(const pti_starts *s, float last)
 }
 
 /* Tests the entry that a start tells of and, near the diagonal of two triangles, the other, too. */
-PTI_INLINE int pti_test_start(const pt_scene *scene, const pti_ray *r, const pti_ray8 *w, const pti_starts *s, float start,
-                              float limit, pti_best *best)
+PTI_INLINE int pti_test_start(const pt_scene *scene, const pti_ray *r, const pti_starts *s, float start, pti_best *best)
 {
     const pti_small *small = (const pti_small *)(const void *)scene->wide.arena;
     const pti_tested *e;
     uint32_t at;
-    float error, clear;
     int hit;
     memcpy(&at, &start, sizeof at);
     at %= 2 * PTI_SMALL;
     e = &small->tested[at];
     if (e->corners == 0) return pti_test(scene, r, e->id, best);
-    error = s->error[at % PTI_SMALL / 8].v[at % 8];
-    clear = 4 * error * (w->span / w->reach);
-    hit = pti_test_flat(r, e->corner, e->corners, e->id, start > clear && pti_last_start(start) + clear < pti_ray8_before(limit), best);
-    if (fabsf(s->more[at % PTI_SMALL / 8].v[at % 8]) > 2 * error) return hit;
+    hit = pti_test_flat(r, e->corner, e->corners, e->id, best);
+    if (fabsf(s->more[at % PTI_SMALL / 8].v[at % 8]) > 2 * s->error[at % PTI_SMALL / 8].v[at % 8]) return hit;
     e = &small->tested[at ^ PTI_SMALL];
-    return hit | pti_test_flat(r, e->corner, e->corners, e->id, 0, best);
+    return hit | pti_test_flat(r, e->corner, e->corners, e->id, best);
 }
 
 PTI_INLINE int pti_search_small(const pt_scene *scene, const pti_ray *r, const pti_ray8 *w, pti_best *best, int any)
@@ -5759,7 +5759,7 @@ PTI_INLINE int pti_search_small(const pt_scene *scene, const pti_ray *r, const p
     }
     s.count = planes + spheres;
     for (start = pti_f8_least(least); start <= limit; start = pti_next_start(&s, start)) {
-        if (!pti_test_start(scene, r, w, &s, start, end, best)) continue;
+        if (!pti_test_start(scene, r, &s, start, best)) continue;
         if (any) return 1;
         found = 1;
         limit = pti_last_start(pti_ray8_limit(w, best->t));

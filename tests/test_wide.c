@@ -446,16 +446,17 @@ static void bounds_of_block(const pti_triangle8 *p, const pti_ray *r, const pti_
     const double end = r->end < 3e38 ? r->end : 3e38;
     const float limit = pti_ray8_limit(w, end);
     const pti_edges8 e = pti_edge_lanes(p, r, w);
-    pti_lanes u, v, x, error, t, off;
+    pti_lanes u, v, x, error, t, det, off;
     unsigned sure = 0, may;
-    pti_f8 bound;
+    pti_f8 bound, all;
     int i;
     u.f = e.u;
     v.f = e.v;
     x.f = e.w;
     error.f = e.error;
-    t.f = pti_depth_lanes(&e, r, w, &bound);
+    t.f = pti_depth_lanes(&e, r, w, &all, &bound);
     off.f = bound;
+    det.f = all;
     may = pti_triangle_lanes(p, r, w, limit, &sure);
     for (i = 0; i < 8; i++) {
         const pti_d3 a = pti_shear_lane(r, &p->v[0][i]), b = pti_shear_lane(r, &p->v[3][i]), c = pti_shear_lane(r, &p->v[6][i]);
@@ -466,8 +467,8 @@ static void bounds_of_block(const pti_triangle8 *p, const pti_ray *r, const pti_
         sum->edge = ratio((double)v.v[i] - dv, (double)error.v[i], sum->edge);
         sum->edge = ratio((double)x.v[i] - dw, (double)error.v[i], sum->edge);
         sum->edges++;
-        if (pti_sheared_triangle(r, a, b, c, end, 0, &depth, &b1, &b2)) {
-            sum->depth = ratio((double)t.v[i] - depth * w->unit, (double)off.v[i], sum->depth);
+        if (pti_sheared_triangle(r, a, b, c, end, &depth, &b1, &b2)) {
+            sum->depth = ratio((double)t.v[i] - depth * fabs(r->d[r->kz]) * (double)det.v[i], (double)off.v[i], sum->depth);
             sum->depths++;
             sum->wrong += !(may >> i & 1);
         } else {
@@ -541,8 +542,8 @@ static void bounds_of_planes(void)
             for (lane = 0; lane < 8; lane++) {
                 const pti_tested *a = &small->tested[8 * block + lane], *b = &small->tested[PTI_SMALL + 8 * block + lane];
                 pti_best best = {end, 0, 0, -1};
-                int hit = pti_test_flat(&r, a->corner, a->corners, a->id, 0, &best);
-                hit |= pti_test_flat(&r, b->corner, b->corners, b->id, 0, &best);
+                int hit = pti_test_flat(&r, a->corner, a->corners, a->id, &best);
+                hit |= pti_test_flat(&r, b->corner, b->corners, b->id, &best);
                 sum.sure += margin.v[lane] > 0;
                 sum.wrong += !hit && margin.v[lane] > 0;
                 if (!hit || error.v[lane] - error.v[lane] != 0 || small->planes[block].steep[lane] <= 0) continue; /* no bound, or empty */
