@@ -9293,7 +9293,7 @@ PTDEF pt_rgbd pt_li_branching(const pt_scene *scene, const pt_ray *ray, pt_sampl
      16 e from the primitive's edges, and the next ray starts 2 e above it; e is the bound of the distance of a computed
      point from its plane (derived at pti_lockstep_make). Primitives are wider by what rounding can do to a hit, so
      that no ray passes between two that share an edge. Scenes with parts smaller than 2048 e, or with edges sharper than
-     8 degrees, are left to pti_path. Where a ball touches a wall, a point within sqrt(4 e r) of the contact starts inside it.
+     8 degrees, are left to pti_path. A ball that touches a wall is not seen from within sqrt(4 e r) of the contact.
 
    A shadow ray starts and ends on surfaces. A plane that has all surfaces on one side cannot come between two points
    of them: the walls of a room are not asked. Parallelograms whose edges follow two axes are tested by three
@@ -9882,7 +9882,8 @@ PTI_INLINE pti_mw pti_lock_flats(const pti_lockstep *k, int kind, pti_w3 o, pti_
     return met;
 }
 
-/* As pti_sphere does it, for d of length 1. */
+/* As pti_sphere does it, for d of length 1. A ray that starts less than 5 e inside comes from something that touches the
+   ball, and does not see it. */
 PTI_INLINE pti_mw pti_lock_balls(const pti_lockstep *k, pti_w3 o, pti_w3 d, pti_lock_best *best, pti_mw met, const int any)
 {
     const pti_fw zero = pti_fw_set(0);
@@ -9895,7 +9896,8 @@ PTI_INLINE pti_mw pti_lock_balls(const pti_lockstep *k, pti_w3 o, pti_w3 d, pti_
         const pti_fw root = pti_fw_sqrt(pti_fw_max(square, zero)), c = pti_fw_mul(pti_fw_sub(far, r), pti_fw_add(far, r));
         const pti_fw q = pti_fw_select(pti_fw_lt(b, zero), pti_fw_sub(b, root), pti_fw_add(b, root)), t0 = pti_fw_div(c, q);
         const pti_fw first = pti_fw_min(t0, q), t = pti_fw_select(pti_fw_lt(zero, first), first, pti_fw_max(t0, q));
-        const pti_fw margin = pti_fw_select(pti_fw_lt(square, zero), pti_fw_set(-1), pti_fw_set(PTI_LOCK_FAR));
+        const pti_mw grazed = pti_mw_and(pti_fw_lt(c, zero), pti_fw_lt(pti_fw_sub(r, far), pti_fw_set(5 * k->e)));
+        const pti_fw margin = pti_fw_select(pti_mw_or(grazed, pti_fw_lt(square, zero)), pti_fw_set(-1), pti_fw_set(PTI_LOCK_FAR));
         const pti_mw hit = pti_lock_keep(best, t, margin, zero, i, any);
         if (any) met = pti_mw_or(met, hit);
     }
@@ -9986,7 +9988,7 @@ typedef struct pti_lock_surface {
     pti_uw i;
     pti_w3 p, n;            /* point, and normal on the side that the path came from                       */
     pti_fw cosine;          /* of the ray and that normal                                                  */
-    pti_mw met, front, ball; /* anything at all; from the side of ng; a sphere                             */
+    pti_mw met, front, ball, brim; /* anything at all; from the side of ng; a sphere; close to an edge     */
     pti_fw kind;
 } pti_lock_surface;
 
@@ -10006,17 +10008,16 @@ PTI_INLINE pti_w3 pti_gather3(const float (*table)[PTI_LOCK_MAX], int row, pti_u
 PTI_INLINE void pti_lock_land(const pti_lockstep *k, pti_w3 o, pti_w3 d, const pti_lock_best *best, pti_lock_surface *s)
 {
     const pti_fw zero = pti_fw_set(0), inset = pti_fw_set(16 * k->e);
-    pti_mw near_edge;
     pti_w3 n;
     s->i = pti_uw_from_floats(best->i);
     s->p = pti_w3_along(d, best->t, o);
     n = pti_gather3(k->of, PTI_OF_N, s->i);
     s->p = pti_w3_along(n, pti_fw_sub(zero, pti_w3_dot_add(n, s->p, pti_fw_gather(k->of[PTI_OF_D], s->i))), s->p);
-    near_edge = pti_fw_lt(best->margin, inset);
-    if (pti_mw_bits(near_edge)) {
+    s->brim = pti_fw_lt(best->margin, inset);
+    if (pti_mw_bits(s->brim)) {
         const pti_fw depth = pti_fw_gather(k->of[PTI_OF_DEPTH], s->i);
         const pti_fw share = pti_fw_div(pti_fw_sub(inset, best->margin), pti_fw_sub(depth, best->margin));
-        s->p = pti_w3_along(pti_w3_sub(pti_gather3(k->of, PTI_OF_CENTRE, s->i), s->p), pti_fw_select(near_edge, share, zero), s->p);
+        s->p = pti_w3_along(pti_w3_sub(pti_gather3(k->of, PTI_OF_CENTRE, s->i), s->p), pti_fw_select(s->brim, share, zero), s->p);
     }
     s->ball = pti_fw_lt(pti_fw_set(1e38f), best->margin);
     if (pti_mw_bits(s->ball)) { /* n = 0 for spheres, so p is as it was */
@@ -10109,6 +10110,16 @@ PTI_INLINE void pti_lock_turn(pti_fw u, pti_fw *c, pti_fw *s)
     *s = pti_fw_sub(pti_fw_set(0), y);
 }
 
+/* How far along s->n the next ray starts, if it goes to w: 2 e off the surface, 8 e inside balls. A point of a wall that touches
+   a ball can start no more than 3 e inside it: so pti_lock_balls tells them apart. */
+PTI_INLINE pti_fw pti_lock_lift(const pti_lockstep *k, const pti_lock_surface *s, pti_w3 w)
+{
+    const pti_fw zero = pti_fw_set(0), along = pti_w3_dot(s->n, w);
+    const pti_fw out = pti_fw_select(s->front, along, pti_fw_sub(zero, along));
+    const pti_fw far = pti_fw_select(pti_mw_and(s->ball, pti_fw_lt(out, zero)), pti_fw_set(8 * k->e), pti_fw_set(2 * k->e));
+    return pti_fw_select(pti_fw_lt(along, zero), pti_fw_sub(zero, far), far);
+}
+
 /* What is known of the lights chosen; one light is the same for all lanes. */
 PTI_INLINE pti_fw pti_lit(const pti_lockstep *k, int row, pti_uw light)
 {
@@ -10161,7 +10172,7 @@ PTI_INLINE int pti_lock_direct(const pti_lockstep *k, const pti_lock_surface *s,
                                pti_lane_row *row, int technique, pt_heuristic heuristic)
 {
     const pti_fw zero = pti_fw_set(0), inverse_pi = pti_fw_set((float)(1 / PT_PI));
-    const pti_w3 o = pti_w3_along(s->n, pti_fw_set(2 * k->e), s->p);
+    const pti_w3 o = pti_w3_along(s->n, pti_lock_lift(k, s, s->n), s->p);
     pti_fw number = zero, density, distance2, distance, here, there, p, weight;
     pti_w3 q, n, w, to;
     pti_mw flat = pti_mw_of_bits(~0u);
@@ -10215,7 +10226,9 @@ PTI_INLINE pti_w3 pti_lock_cosine(pti_w3 n, pti_fw u, pti_fw v, pti_fw *z)
     return pti_w3_normalize(pti_w3_along(n, *z, pti_w3_along(t, pti_fw_mul(r, pti_fw_select(wide, sine, cosine)), s)));
 }
 
-/* Mirrors and glass: the next direction, and what beta is multiplied by. */
+/* Mirrors and glass: the next direction, and what beta is multiplied by. Glass that is left within 16 e of an edge does not
+   bend: a face is wider than it is by rounding, and a ray that passes by could hit its back, be reflected into the glass
+   at an angle that no refraction gives, and never get out. */
 PTI_INLINE pti_w3 pti_lock_specular(const pti_lockstep *k, const pti_lock_surface *s, pti_w3 d, pti_fw u, pti_w3 *weight, pti_lane_row *row)
 {
     const pti_fw one = pti_fw_set(1), zero = pti_fw_set(0), two_cosines = pti_fw_add(s->cosine, s->cosine);
@@ -10226,14 +10239,16 @@ PTI_INLINE pti_w3 pti_lock_specular(const pti_lockstep *k, const pti_lock_surfac
     const pti_fw rp = pti_fw_div(pti_fw_nmadd(eta, other, s->cosine), pti_fw_madd(eta, other, s->cosine));
     const pti_fw half = pti_fw_mul(pti_fw_set(0.5f), pti_fw_madd(rs, rs, pti_fw_mul(rp, rp)));
     const pti_fw fresnel = pti_fw_select(pti_fw_lt(sine2, one), half, one);
-    const pti_mw bent = pti_mw_and(pti_lock_is(s, PT_MATERIAL_DIELECTRIC), pti_fw_le(fresnel, u));
+    const pti_mw glass = pti_lock_is(s, PT_MATERIAL_DIELECTRIC), brim = pti_mw_and(glass, s->brim);
+    const pti_fw side = pti_fw_select(s->front, one, zero), bend = pti_fw_select(brim, side, one); /* 0: straight on */
+    const pti_mw bent = pti_mw_and(glass, pti_fw_le(fresnel, pti_fw_mul(u, bend)));
     const pti_fw eta2 = pti_fw_mul(eta, eta);
     const pti_w3 mirrored = pti_w3_along(s->n, two_cosines, d);
     const pti_w3 refracted = pti_w3_along(s->n, pti_fw_nmadd(other, one, pti_fw_mul(eta, s->cosine)), pti_w3_scale(d, eta));
     const pti_w3 grey = pti_w3_make(pti_fw_select(bent, eta2, one), pti_fw_select(bent, eta2, one), pti_fw_select(bent, eta2, one));
-    *weight = pti_w3_select(pti_lock_is(s, PT_MATERIAL_DIELECTRIC), grey, *weight);
+    *weight = pti_w3_select(glass, grey, *weight);
     row[PTI_ROW_ETA2].f = pti_fw_select(bent, pti_fw_div(row[PTI_ROW_ETA2].f, eta2), row[PTI_ROW_ETA2].f);
-    return pti_w3_normalize(pti_w3_select(bent, refracted, mirrored));
+    return pti_w3_normalize(pti_w3_select(pti_fw_lt(zero, bend), pti_w3_select(bent, refracted, mirrored), d));
 }
 
 /* Russian roulette, as pti_roulette; the lanes that go on. */
@@ -10313,8 +10328,7 @@ static unsigned pti_lock_vertex(pti_lock_work *w, pti_lane_row *row, unsigned ac
     if (options->roulette != PT_ROULETTE_NONE) go = pti_mw_and(go, pti_lock_roulette(options, row, &beta, u_roulette));
     pti_row3_set(row + PTI_ROW_BETA, beta);
     pti_row3_set(row + PTI_ROW_D, next);
-    cosine = pti_fw_select(pti_fw_lt(pti_w3_dot(s.n, next), zero), pti_fw_set(-2 * k->e), pti_fw_set(2 * k->e));
-    pti_row3_set(row + PTI_ROW_O, pti_w3_along(s.n, cosine, s.p));
+    pti_row3_set(row + PTI_ROW_O, pti_w3_along(s.n, pti_lock_lift(k, &s, next), s.p));
     row[PTI_ROW_DENSITY].f = density;
     row[PTI_ROW_EDGES].u = pti_uw_add(row[PTI_ROW_EDGES].u, pti_uw_set(1));
     return pti_mw_bits(go);
