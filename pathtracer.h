@@ -60,6 +60,7 @@
        [PT-09] lights
        [PT-10] scene, camera, film
        [PT-11] integrators: path tracing, Whitted, distribution, branching; light-path expressions
+       [PT-11b] lockstep: path tracing of small scenes, 8 or 16 paths at a time
        [PT-17] files: pictures (PPM, PFM, PNG), films, models (OBJ with MTL)
        [PT-18] render driver: passes, threads, budgets, error against run time
        [PT-19] canonical scenes
@@ -77,7 +78,7 @@
        PT_NO_FILES         no files: pictures, films, tables; implies PT_NO_OBJ
        PT_NO_OBJ           no models from OBJ files
        PT_NO_BVH           linear search instead of a tree; implies that there is no wide one
-       PT_NO_SIMD          no lanes and no wide tree: the binary one, which is 3 to 5 times slower
+       PT_NO_SIMD          no lanes: the binary tree, which is 3 to 5 times slower, and paths one at a time
        PT_NO_INTRINSICS    lanes in plain C, also where the compiler aims at SSE2 or AVX2 (-mavx2 -mfma, -march=native)
        PT_NO_ENVIRONMENT   no light from the background
        PT_NO_MICROFACET    no rough metal and glass, no smooth metal, no Oren-Nayar
@@ -113,6 +114,9 @@
        Decisions (does this ray meet this sphere, which side of this edge) are made in double from
        the pt_real input. No constant is tuned to the size of a scene: rays start at an offset that
        follows from the rounding error of their own origin ([PT-06]). Sums over samples are double.
+       Small scenes of diffuse surfaces, mirrors and glass are rendered by paths that walk in lockstep
+       ([PT-11b]): they decide in float, between primitives that are wider by the rounding of a hit.
+       desc.no_lockstep asks for one path at a time; the two agree in the mean, not in their bits.
        Build with -ffp-contract=off when two builds or two instances of the path integrator must give
        the same bits: a fused multiply-add rounds once where two operations round twice, and a
        compiler may fuse differently in each copy. Hits and misses of triangles do not depend on it.
