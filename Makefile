@@ -199,6 +199,7 @@ build/test/test_%: tests/test_%.c $(wildcard tests/*.h) pathtracer.h build/test/
 	$(BUILD_C) -Itests -DPT_TEST_LINKED $< build/test/implementation.o -o $@ $(LDLIBS)
 
 build/test/test_stress: tests/stress.c
+build/test/test_wide_plain build/test/test_wide_avx2: tests/test_wide.c
 
 build/test/test_%.log: build/test/test_% FORCE
 	@sh tests/run.sh one $@ ./$<

@@ -912,7 +912,6 @@ typedef struct pt_wide {
     uint32_t triangles;      /* primitives below this number are triangles                                 */
     int plane_blocks, sphere_blocks; /* a small scene has these instead of a tree                          */
     float extent;            /* the largest coordinate, in magnitude                                       */
-    pt_vec3 lo, hi;
 } pt_wide;
 #endif
 
@@ -2433,6 +2432,8 @@ PTI_F8(pti_f8, pti_f8_max, _mm256_max_ps(x, y), _mm_max_ps(x, y), x > y ? x : y)
 PTI_F8(pti_m8, pti_f8_lt, _mm256_cmp_ps(x, y, _CMP_LT_OQ), _mm_cmplt_ps(x, y), x < y ? -1 : 0)
 PTI_F8(pti_m8, pti_f8_le, _mm256_cmp_ps(x, y, _CMP_LE_OQ), _mm_cmple_ps(x, y), x <= y ? -1 : 0)
 PTI_F8(pti_f8, pti_f8_root, _mm256_sqrt_ps(x), _mm_sqrt_ps(x), sqrtf(x))
+PTI_F8(pti_f8, pti_f8_flip, _mm256_xor_ps(x, _mm256_and_ps(y, _mm256_set1_ps(-0.0f))), _mm_xor_ps(x, _mm_and_ps(y, _mm_set1_ps(-0.0f))),
+       y < 0 ? -x : x) /* -x where y is negative */
 PTI_F8(pti_f8, pti_f8_unsign, _mm256_andnot_ps(y, x), _mm_andnot_ps(y, x), fabsf(x)) /* y = -0 */
 PTI_INLINE pti_f8 pti_f8_sqrt(pti_f8 x) { return pti_f8_root(x, x); }
 PTI_INLINE pti_f8 pti_f8_abs(pti_f8 x) { return pti_f8_unsign(x, pti_f8_set(-0.0f)); }
@@ -2443,6 +2444,13 @@ PTI_INLINE pti_f8 pti_f8_nmadd(pti_f8 x, pti_f8 y, pti_f8 z) { return _mm256_fnm
 #else
 PTI_INLINE pti_f8 pti_f8_madd(pti_f8 x, pti_f8 y, pti_f8 z) { return pti_f8_add(pti_f8_mul(x, y), z); }
 PTI_INLINE pti_f8 pti_f8_nmadd(pti_f8 x, pti_f8 y, pti_f8 z) { return pti_f8_sub(z, pti_f8_mul(x, y)); }
+#endif
+
+/* Of long functions of lanes: loops in C, inlined by the hundred, take compilers seconds. */
+#if PTI_LANES > 0
+#define PTI_INLINE8 PTI_INLINE
+#else
+#define PTI_INLINE8 static
 #endif
 
 /* Lanes as numbers. */
@@ -4020,13 +4028,12 @@ PTI_INLINE double pti_depth_error(const pti_ray *r, pti_d3 a, pti_d3 b, pti_d3 c
     return 3 * (3 * e * edge * z + dedge * z + dz * edge);
 }
 
-/* Of the sheared corners a, b, c: t in (0, tmax) and weights of b and c. clear: t is known to be farther from 0 and from
-   the ray's end than rounding can move it. */
-PTI_INLINE int pti_sheared_triangle(const pti_ray *r, pti_d3 a, pti_d3 b, pti_d3 c, double tmax, int clear, double *t,
-                                    double *b1, double *b2)
+/* Of the sheared corners a, b, c: t in (0, tmax) and weights of b and c. */
+PTI_INLINE int pti_sheared_triangle(const pti_ray *r, pti_d3 a, pti_d3 b, pti_d3 c, double tmax, double *t, double *b1,
+                                    double *b2)
 {
     const double u = pti_edge(c.x, b.y, c.y, b.x), v = pti_edge(a.x, c.y, a.y, c.x), w = pti_edge(b.x, a.y, b.y, a.x);
-    double det, depth, p, q;
+    double det, depth, error, p, q;
     if (pti_signs_differ(u, v, w) && ((u < 0) + (v < 0) + (w < 0)) * ((u > 0) + (v > 0) + (w > 0)) != 0) return 0;
     det = u + v + w;
     if (det == 0) return 0; /* seen edge-on */
@@ -4038,11 +4045,9 @@ PTI_INLINE int pti_sheared_triangle(const pti_ray *r, pti_d3 a, pti_d3 b, pti_d3
     PTI_FENCE(depth);
     depth += p + q;
     if (!(depth / det > 0 && depth / det < tmax)) return 0; /* NaN misses */
-    if (!clear) {
-        const double error = pti_depth_error(r, a, b, c, u, v, w);
-        if (!(fabs(depth) > error)) return 0; /* the origin may lie on it, */
-        if (!(fabs(depth) + error < r->end * fabs(det))) return 0; /* or the end of a shadow ray */
-    }
+    error = pti_depth_error(r, a, b, c, u, v, w);
+    if (!(fabs(depth) > error)) return 0; /* the origin may lie on it, */
+    if (!(fabs(depth) + error < r->end * fabs(det))) return 0; /* or the end of a shadow ray */
     *t = depth / det;
     *b1 = v / det;
     *b2 = w / det;
@@ -4050,9 +4055,9 @@ PTI_INLINE int pti_sheared_triangle(const pti_ray *r, pti_d3 a, pti_d3 b, pti_d3
 }
 
 PTI_INLINE int pti_triangle(const pti_ray *r, const pt_vec3 *v0, const pt_vec3 *v1, const pt_vec3 *v2, double tmax,
-                            int clear, double *t, double *b1, double *b2)
+                            double *t, double *b1, double *b2)
 {
-    return pti_sheared_triangle(r, pti_shear(r, v0), pti_shear(r, v1), pti_shear(r, v2), tmax, clear, t, b1, b2);
+    return pti_sheared_triangle(r, pti_shear(r, v0), pti_shear(r, v1), pti_shear(r, v2), tmax, t, b1, b2);
 }
 
 /* The corners in order, rounded to pt_real as a user's own sums would be: then a neighbour with the same
@@ -4066,16 +4071,17 @@ PTI_INLINE void pti_parallelogram_corners(const pt_parallelogram *s, pt_vec3 v[4
 }
 
 /* A parallelogram is two triangles that share the diagonal from the corner; u and v are the weights of its
-   edges, u >= v in the first triangle. */
-static int pti_parallelogram(const pti_ray *r, const pt_vec3 c[4], double tmax, int clear, double *t, double *u, double *v)
+   edges, u >= v in the first triangle. Rounded corners may fold it, so that a ray meets both: then the first decides, also
+   where it is beyond tmax, so that the answer does not depend on what was tested before. */
+static int pti_parallelogram(const pti_ray *r, const pt_vec3 c[4], double tmax, double *t, double *u, double *v)
 {
     double b1, b2;
-    if (pti_triangle(r, &c[0], &c[1], &c[2], tmax, clear, t, &b1, &b2)) {
+    if (pti_triangle(r, &c[0], &c[1], &c[2], HUGE_VAL, t, &b1, &b2)) {
         *u = b1 + b2;
         *v = b2;
-        return 1;
+        return *t < tmax;
     }
-    if (pti_triangle(r, &c[0], &c[2], &c[3], tmax, clear, t, &b1, &b2)) {
+    if (pti_triangle(r, &c[0], &c[2], &c[3], tmax, t, &b1, &b2)) {
         *u = b1;
         *v = b1 + b2;
         return 1;
@@ -4129,7 +4135,7 @@ static int pti_triangle_has_area(pt_vec3 v0, pt_vec3 v1, pt_vec3 v2)
 PTDEF int pt_intersect_triangle(const pt_ray *ray, pt_vec3 v0, pt_vec3 v1, pt_vec3 v2, double *t, double b[2])
 {
     pti_ray r = pti_ray_make(ray);
-    return pti_triangle_has_area(v0, v1, v2) && pti_triangle(&r, &v0, &v1, &v2, (double)ray->tmax, 0, t, &b[0], &b[1]);
+    return pti_triangle_has_area(v0, v1, v2) && pti_triangle(&r, &v0, &v1, &v2, (double)ray->tmax, t, &b[0], &b[1]);
 }
 
 /* A ray made ready for boxes: o and 1/d, rounded; 1/0 = infinity. */
@@ -4291,12 +4297,12 @@ PTI_INLINE int pti_keep(pti_best *best, int i, double t, double u, double v)
 }
 
 /* Tests flat primitive i, of three or four corners, for t in (0, best->t]. */
-static int pti_test_flat(const pti_ray *r, const pt_vec3 *c, int corners, int i, int clear, pti_best *best)
+static int pti_test_flat(const pti_ray *r, const pt_vec3 *c, int corners, int i, pti_best *best)
 {
     const double tmax = pti_before(best, i);
     double t, u, v;
-    return (corners == 3 ? pti_triangle(r, &c[0], &c[1], &c[2], tmax, clear, &t, &u, &v)
-                         : pti_parallelogram(r, c, tmax, clear, &t, &u, &v)) && pti_keep(best, i, t, u, v);
+    return (corners == 3 ? pti_triangle(r, &c[0], &c[1], &c[2], tmax, &t, &u, &v)
+                         : pti_parallelogram(r, c, tmax, &t, &u, &v)) && pti_keep(best, i, t, u, v);
 }
 
 /* Tests primitive i of the scene. */
@@ -4309,7 +4315,7 @@ PTI_INLINE int pti_test(const pt_scene *scene, const pti_ray *r, int i, pti_best
         const pt_sphere *s = &scene->spheres[p->index];
         return pti_sphere(r, s->centre, (double)s->radius, pti_before(best, i), &t) && pti_keep(best, i, t, 0, 0);
     }
-    return pti_test_flat(r, c, pti_corners(scene, p, c), i, 0, best);
+    return pti_test_flat(r, c, pti_corners(scene, p, c), i, best);
 }
 
 /* Error of a point computed in double from terms of magnitude m and then rounded to pt_real. Sixteen
@@ -4754,8 +4760,11 @@ static int pti_traverse(const pt_scene *scene, const pti_ray *r, pti_best *best,
    rounding costs time, never a hit: the wide tree, the binary tree and the linear search agree, and a lane may use
    fused multiply-adds where there are some.
 
-   Below, u = 2^-24 is the roundoff of float: each operation is off by u of its result. Products may underflow, and
-   numbers below 2^-126 count as zero in some modes of processors: for these each bound holds PTI_TINY.
+   Below, u = 2^-24 is the roundoff of float: each operation is off by u of its result. S is a length that no coordinate of
+   a ray's origin and of the scene exceeds, and no way between them along an axis. It is kept between 2^-16 and 2^40: then no
+   product of three lengths, 24 S^3 at most, overflows, and every bound is so far above 2^-126, the smallest of them
+   160 (1.1 u S)^3, that what underflows, or counts as zero in some modes of processors, does not matter. Scenes that are
+   smaller than 2^-24 or larger than 2^39 get the tree of [PT-07].
 
    What makes it fast [Wal08], [Yli17], in the order of what each gave: nodes of eight children, so that a ray visits a
    third of the nodes and tests their boxes at the price of one; leaves of eight triangles, stored as rows of lanes; nodes and
@@ -4765,7 +4774,8 @@ static int pti_traverse(const pt_scene *scene, const pti_ray *r, pti_best *best,
 #if PTI_HAS_WIDE
 
 #define PTI_U 5.9604644775390625e-8f
-#define PTI_TINY 9.4039548e-38f /* 2^-123 */
+#define PTI_LEAST_SPAN 1.52587891e-5f
+#define PTI_MOST_SPAN 1.09951163e12f
 
 /* Nodes and leaves lie in an arena of lines of 64 bytes, as the cache has them. A reference is the number of a line times 8,
    plus what lies there; without that it is the offset in bytes over 8. */
@@ -4968,13 +4978,18 @@ static void pti_build_binary(pti_wide_builder *b, uint32_t n, const pti_joined *
     }
     node->child = 0;
     for (k = 0; k < 7; k++) node->cost[k] = pti_scaled_area(b, all->box.v);
-    if (node->count <= 8 && (n > 0 || b->flats == 0 || b->flats >= end)) return;
+    if (node->count <= 8 && (n > 0 || b->flats == 0 || b->flats >= end)) {
+        if (depth >= 8 || node->count < 2) return;
+        pti_find_parting(b, begin, end, all->centres.v, 1, &p);
+        if (!(p.cost < pti_scaled_area(b, all->box.v))) return;
+    }
     if (pieces && n > 0 && node->count <= b->piece_size && b->piece_count < PTI_PIECES) {
         const pti_piece piece = {n, depth, *all};
         b->pieces[b->piece_count++] = piece;
         return;
     }
-    if (n == 0 && b->flats > 0 && b->flats < end) p.middle = b->flats;
+    if (p.cost < HUGE_VALF) ;
+    else if (n == 0 && b->flats > 0 && b->flats < end) p.middle = b->flats;
     else if (depth < PTI_WIDE_DEPTH) pti_find_parting(b, begin, end, all->centres.v, depth < 8 ? 1 : 4, &p);
     middle = pti_part(b, begin, end, &p, side);
     node->child = (uint32_t)PTI_ADD(&b->next, 2);
@@ -5166,12 +5181,9 @@ static int pti_build_wide_tree(const pt_scene *scene, pt_wide *wide, uint32_t tr
         ok = b.used / 64 < (size_t)1 << 29 && pti_alloc_arena(wide, b.used, user);
     }
     if (ok) {
-        const float *lo = b.nodes[0].lo, *hi = b.nodes[0].hi;
         b.arena = wide->arena;
         b.used = 0;
         wide->root = pti_write_tree(&b, 0);
-        wide->lo = pt_v3(lo[0], lo[1], lo[2]);
-        wide->hi = pt_v3(hi[0], hi[1], hi[2]);
     }
     pti_free(memory, user);
     return ok;
@@ -5180,19 +5192,19 @@ static int pti_build_wide_tree(const pt_scene *scene, pt_wide *wide, uint32_t tr
 /* A RAY for lanes, with what bounds their errors. */
 typedef struct pti_ray8 {
     float o[3], d[3];
-    float span;             /* S: no coordinate of o or of the scene, no way between them along an axis is larger */
+    float span;             /* S                                                                           */
     float reach;            /* m: all |d| together                                                         */
     double unit;            /* t unit is the t of d above                                                  */
     /* for a tree: boxes, t = face * inverse + near (or far), and offsets of the rows of faces */
     float inverse[3], near[3], far[3];
     unsigned near_row[3], far_row[3];
-    /* triangles: offsets of the rows of the axes x y z of [PT-06], shear, 4 u s and (1 + s) r of pti_triangle_lanes, times 4 */
+    /* triangles: offsets of the rows of the axes x y z of [PT-06], shear, and errors: D and K below, and that of z */
     unsigned x, y, z;
-    float sx, sy, by_depth, by_origin;
+    float sx, sy, across, edge, along;
 } pti_ray8;
 
-/* 0: a ray that is not finite or from beyond 2^80: the linear search takes it. A direction far from length 1 is measured in
-   its longest component, so that 1/d does not overflow. */
+/* 0: a ray that is not finite or from beyond 2^40: the linear search takes it. A direction far from length 1 is measured in
+   its longest component, so that o/d does not overflow. */
 PTI_INLINE int pti_ray8_make(pti_ray8 *w, const pti_ray *r, float extent)
 {
     int k;
@@ -5202,25 +5214,26 @@ PTI_INLINE int pti_ray8_make(pti_ray8 *w, const pti_ray *r, float extent)
     }
     w->unit = 1;
     w->reach = fabsf(w->d[0]) + fabsf(w->d[1]) + fabsf(w->d[2]);
-    w->span = fabsf(w->o[0]) + fabsf(w->o[1]) + fabsf(w->o[2]) + extent + 1e-30f;
-    if (!(w->reach > 1e-12f && w->reach < 1e12f)) {
+    w->span = fabsf(w->o[0]) + fabsf(w->o[1]) + fabsf(w->o[2]) + extent + PTI_LEAST_SPAN;
+    if (!(w->reach > 1e-6f && w->reach < 1e6f)) {
         w->unit = fabs(r->d[r->kz]);
         for (k = 0; k < 3; k++) w->d[k] = (float)(r->d[k] / w->unit);
         w->reach = fabsf(w->d[0]) + fabsf(w->d[1]) + fabsf(w->d[2]);
         if (!(w->reach < 4)) return 0; /* nor is NaN */
     }
-    return w->span < 1.2e24f;
+    return w->span < PTI_MOST_SPAN && r->end == r->end;
 }
 
 /* One axis of boxes [Ize13]: with q = 1/d as rounded, face * q - o * q is off by at most 5 u (|t| + |o q|), and |t| up to the
-   end of the scene is at most S |q|. A direction so flat that q would overflow is taken as 2^-60 m, and the far face put off
-   by what it can move until then. */
+   end of the scene is at most S |q|. A direction so flat that q might overflow is taken as f = 2^-26 m, m the 1-norm of d: until
+   the end of the scene, at t <= 3 S / m, the ray moves by at most f t, so near faces come no later, and far ones are put off by
+   2 t. Both are less than the error of the faces themselves. */
 PTI_INLINE void pti_ray8_axis(pti_ray8 *w, unsigned k)
 {
-    const float flat = w->reach * 8.67361738e-19f;
+    const float flat = w->reach * 1.49011612e-8f;
     const int is_flat = fabsf(w->d[k]) < flat;
     const float q = 1 / (is_flat ? flat : w->d[k]), from = -w->o[k] * q;
-    const float off = (12 * PTI_U * w->span + PTI_TINY) * fabsf(q) + (is_flat ? 8 * w->span / w->reach : 0);
+    const float off = 12 * PTI_U * w->span * fabsf(q) + (is_flat ? 7 * w->span / w->reach : 0);
     w->inverse[k] = q;
     w->near[k] = from - off;
     w->far[k] = from + off;
@@ -5240,8 +5253,9 @@ PTI_INLINE void pti_ray8_for_tree(pti_ray8 *w, const pti_ray *r)
     w->sx = (float)r->sx;
     w->sy = (float)r->sy;
     skew = fabsf(w->sx) > fabsf(w->sy) ? fabsf(w->sx) : fabsf(w->sy);
-    w->by_depth = 4 * 4.2f * PTI_U * skew;
-    w->by_origin = 4 * (1.1f * PTI_U * (1 + skew) * w->span + PTI_TINY);
+    w->across = (3.1f + 7.1f * skew) * PTI_U * w->span;
+    w->edge = (16.1f + 32.1f * skew) * PTI_U * w->span;
+    w->along = 12 * PTI_U * w->span;
 }
 
 /* A limit of t in units of w->d, rounded up, finite; and a time that is certainly before it. */
@@ -5260,7 +5274,7 @@ PTI_INLINE pti_f8 pti_row(const void *p, unsigned offset)
 }
 
 /* The children whose boxes the ray may meet by the limit, and where they begin. */
-PTI_INLINE unsigned pti_node_lanes(const pti_node8 *n, const pti_ray8 *w, float limit, pti_lanes *begin)
+PTI_INLINE8 unsigned pti_node_lanes(const pti_node8 *n, const pti_ray8 *w, float limit, pti_lanes *begin)
 {
     const pti_f8 qx = pti_f8_set(w->inverse[0]), qy = pti_f8_set(w->inverse[1]), qz = pti_f8_set(w->inverse[2]);
     const pti_f8 near_x = pti_f8_madd(pti_row(n->box, w->near_row[0]), qx, pti_f8_set(w->near[0]));
@@ -5289,10 +5303,11 @@ typedef struct pti_edges8 {
 
 /* As in [PT-06]: corners relative to the origin, sheared; U = c x b, V = a x c, W = b x a.
 
-   With s the larger |shear|, r = u |o| for the rounding of the origin, and Z the largest |z|, a sheared x = c.x - s z is off
-   by at most D = u (4 s Z + 2 |x|) + (1 + s) r: two differences, the shear and a product, each rounded once. The four factors
-   of an edge function are at most M = |x| + D, or |y| + D, so it is off by at most E = 4 M (D + u M). */
-PTI_INLINE pti_edges8 pti_edge_lanes(const pti_triangle8 *p, const pti_ray *r, const pti_ray8 *w)
+   With s the larger |shear|, a sheared x = c.x - s z is off by at most u (4 s |z| + 2 |x|) for two differences, the shear and a
+   product, each rounded once, and by (1 + s) u |o| for the rounding of the origin: by D = (3 + 7 s) u S in all, as |z| <= S and
+   |x| <= (1 + s) S. With M = X + D, X the largest |x| and |y|, factors of edge functions are at most M, so these are off by
+   4 M (D + u M) <= E = K (X + D), K = (16 + 32 s) u S. */
+PTI_INLINE8 pti_edges8 pti_edge_lanes(const pti_triangle8 *p, const pti_ray *r, const pti_ray8 *w)
 {
     const pti_f8 ox = pti_f8_set(w->o[r->kx]), oy = pti_f8_set(w->o[r->ky]), oz = pti_f8_set(w->o[r->kz]);
     const pti_f8 sx = pti_f8_set(w->sx), sy = pti_f8_set(w->sy);
@@ -5303,9 +5318,7 @@ PTI_INLINE pti_edges8 pti_edge_lanes(const pti_triangle8 *p, const pti_ray *r, c
     const pti_f8 ay = pti_f8_nmadd(sy, az, pti_f8_sub(pti_row(p->v[0], w->y), oy));
     const pti_f8 by = pti_f8_nmadd(sy, bz, pti_f8_sub(pti_row(p->v[3], w->y), oy));
     const pti_f8 cy = pti_f8_nmadd(sy, cz, pti_f8_sub(pti_row(p->v[6], w->y), oy));
-    const pti_f8 far = pti_largest8(az, bz, cz), wide = pti_f8_max(pti_largest8(ax, bx, cx), pti_largest8(ay, by, cy));
-    const pti_f8 d4 = pti_f8_madd(far, pti_f8_set(w->by_depth), pti_f8_madd(wide, pti_f8_set(4 * 2.1f * PTI_U), pti_f8_set(w->by_origin)));
-    const pti_f8 m = pti_f8_madd(d4, pti_f8_set(0.25f), wide);
+    const pti_f8 wide = pti_f8_max(pti_largest8(ax, bx, cx), pti_largest8(ay, by, cy));
     pti_edges8 e;
     e.az = az;
     e.bz = bz;
@@ -5315,22 +5328,22 @@ PTI_INLINE pti_edges8 pti_edge_lanes(const pti_triangle8 *p, const pti_ray *r, c
     e.w = pti_edge8(bx, ay, by, ax);
     e.low = pti_f8_min(e.u, pti_f8_min(e.v, e.w));
     e.high = pti_f8_max(e.u, pti_f8_max(e.v, e.w));
-    e.error = pti_f8_mul(m, pti_f8_madd(m, pti_f8_set(4.1f * PTI_U), d4));
+    e.error = pti_f8_madd(wide, pti_f8_set(w->edge), pti_f8_set(w->edge * w->across));
     return e;
 }
 
-/* t = (U a.z + V b.z + W c.z) / (U + V + W) / d.z, and *off, the bound of its error. z is off by u Z + r, and U, V, W weigh depths
-   that are at most e apart, so it is off by F + E (3 e + 10 F) / |U + V + W|, all over |d.z|, with F = 13 u Z + r, the roundings
-   of this sum and of 1/d.z included. */
-PTI_INLINE pti_f8 pti_depth_lanes(const pti_edges8 *e, const pti_ray *r, const pti_ray8 *w, pti_f8 *off)
+/* Depth times determinant: t |d.z| |det| and, in *off, what it is off by; *det: |det|. With N = U a.z + V b.z + W c.z and the
+   z of a hit, N - z det is sum dU (a.z - z) + sum U da.z and roundings. Depths are at most e apart, and U, V, W have one sign
+   but for E: so it is off by 3 E e + (|det| + 6 E) 7 u S, and by 4 u |det| S more for the roundings of d, t and the limit. */
+PTI_INLINE8 pti_f8 pti_depth_lanes(const pti_edges8 *e, const pti_ray *r, const pti_ray8 *w, pti_f8 *det, pti_f8 *off)
 {
-    const pti_f8 inverse = pti_f8_div(pti_f8_set(w->inverse[r->kz]), pti_f8_add(e->u, pti_f8_add(e->v, e->w)));
+    const pti_f8 sum = pti_f8_mul(pti_f8_add(e->u, pti_f8_add(e->v, e->w)), pti_f8_set(w->d[r->kz] < 0 ? -1.0f : 1.0f));
     const pti_f8 depth = pti_f8_madd(e->u, e->az, pti_f8_madd(e->v, e->bz, pti_f8_mul(e->w, e->cz)));
     const pti_f8 last = pti_f8_max(e->az, pti_f8_max(e->bz, e->cz)), first = pti_f8_min(e->az, pti_f8_min(e->bz, e->cz));
-    const pti_f8 f = pti_f8_madd(pti_largest8(e->az, e->bz, e->cz), pti_f8_set(13 * PTI_U), pti_f8_set(w->by_origin));
-    const pti_f8 weigh = pti_f8_madd(f, pti_f8_set(10), pti_f8_mul(pti_f8_sub(last, first), pti_f8_set(3.1f)));
-    *off = pti_f8_madd(pti_f8_mul(e->error, weigh), pti_f8_abs(inverse), pti_f8_mul(f, pti_f8_set(fabsf(w->inverse[r->kz]))));
-    return pti_f8_mul(depth, inverse);
+    const pti_f8 weigh = pti_f8_madd(pti_f8_sub(last, first), pti_f8_set(3.1f), pti_f8_set(4 * w->along));
+    *det = pti_f8_abs(sum);
+    *off = pti_f8_madd(e->error, weigh, pti_f8_mul(*det, pti_f8_set(w->along)));
+    return pti_f8_flip(depth, sum);
 }
 
 /* Which of eight triangles may be hit by the limit? *sure, where it is asked for: which certainly are; both bounds are at
@@ -5339,14 +5352,14 @@ PTI_INLINE unsigned pti_triangle_lanes(const pti_triangle8 *p, const pti_ray *r,
 {
     const pti_edges8 e = pti_edge_lanes(p, r, w);
     const pti_f8 zero = pti_f8_set(0), one_side = pti_f8_max(pti_f8_add(e.low, e.error), pti_f8_sub(e.error, e.high));
-    unsigned lanes = pti_m8_bits(pti_f8_le(pti_f8_set(-PTI_TINY), one_side));
+    unsigned lanes = pti_m8_bits(pti_f8_le(zero, one_side));
     if (lanes) {
-        pti_f8 off;
-        const pti_f8 t = pti_depth_lanes(&e, r, w, &off);
-        const pti_f8 over = pti_f8_sub(pti_f8_sub(t, off), pti_f8_set(limit));
-        lanes &= ~pti_m8_bits(pti_f8_lt(zero, over)) & ~pti_m8_bits(pti_f8_lt(pti_f8_add(t, off), zero)); /* NaN may be hit */
+        const float flat = fabsf(w->d[r->kz]);
+        pti_f8 det, off;
+        const pti_f8 depth = pti_depth_lanes(&e, r, w, &det, &off);
+        lanes &= pti_m8_bits(pti_f8_le(pti_f8_sub(depth, off), pti_f8_mul(det, pti_f8_set(limit * flat < 2 * w->span ? limit * flat : 2 * w->span)))) & pti_m8_bits(pti_f8_le(zero, pti_f8_add(depth, off)));
         if (sure) {
-            const pti_f8 clear = pti_f8_min(t, pti_f8_sub(pti_f8_set(pti_ray8_before(limit)), t));
+            const pti_f8 clear = pti_f8_min(depth, pti_f8_sub(pti_f8_mul(det, pti_f8_set(pti_ray8_before(limit) * flat)), depth));
             *sure = pti_m8_bits(pti_f8_lt(e.error, pti_f8_max(e.low, pti_f8_sub(zero, e.high)))) &
                     pti_m8_bits(pti_f8_lt(pti_f8_add(off, off), clear));
         }
@@ -5359,7 +5372,7 @@ PTI_INLINE unsigned pti_triangle_lanes(const pti_triangle8 *p, const pti_ray *r,
    The foot of the perpendicular from the centre is l = f + b d with f = o - c and b = -f.d / d.d. f is off by 2 u S a
    coordinate and b |d| by 31 u S, along the ray; so |l| is off by at most 47 u S, and with the radius r + 64 u S both the
    question and the half chord are on the safe side; 48 u S more cover b. */
-PTI_INLINE pti_f8 pti_sphere_lanes(const pti_sphere8 *p, const pti_ray8 *w)
+PTI_INLINE8 pti_f8 pti_sphere_lanes(const pti_sphere8 *p, const pti_ray8 *w)
 {
     const pti_f8 dx = pti_f8_set(w->d[0]), dy = pti_f8_set(w->d[1]), dz = pti_f8_set(w->d[2]), zero = pti_f8_set(0);
     const pti_f8 fx = pti_f8_sub(pti_f8_set(w->o[0]), pti_f8_load(p->centre[0]));
@@ -5433,7 +5446,7 @@ PTI_INLINE int pti_test_lane(const pt_scene *scene, const pti_ray *r, const pti_
     double t, u, v;
     if (id >= (int)scene->wide.triangles) return pti_test(scene, r, id, best);
     return pti_sheared_triangle(r, pti_shear_lane(r, &p->v[0][i]), pti_shear_lane(r, &p->v[3][i]), pti_shear_lane(r, &p->v[6][i]),
-                                pti_before(best, id), 0, &t, &u, &v) && pti_keep(best, id, t, u, v);
+                                pti_before(best, id), &t, &u, &v) && pti_keep(best, id, t, u, v);
 }
 
 PTI_INLINE int pti_test_leaf(const pt_scene *scene, uint32_t leaf, const pti_ray *r, const pti_ray8 *w, float limit, pti_best *best, int any)
@@ -5574,7 +5587,7 @@ static void pti_write_plane(pti_plane8 *out, uint32_t i, const pt_vec3 *c, int c
 }
 
 /* Lane `lane` from primitive i on; how many it takes. */
-static uint32_t pti_write_flat(const pt_scene *scene, pti_small *out, uint32_t lane, uint32_t i, uint32_t flats, double extent)
+static uint32_t pti_write_flat(const pt_scene *scene, pti_small *out, uint32_t lane, uint32_t i, uint32_t flats)
 {
     pti_tested *a = &out->tested[lane], *b = &out->tested[PTI_SMALL + lane];
     pti_plane8 *plane = &out->planes[lane / 8];
@@ -5584,7 +5597,7 @@ static uint32_t pti_write_flat(const pt_scene *scene, pti_small *out, uint32_t l
     a->corners = pti_corners(scene, &scene->primitives[a->id], a->corner);
     *b = *a;
     if (a->corners == 3 && i + 1 < flats && pti_corners(scene, &scene->primitives[i + 1], b->corner) == 3 &&
-        pti_is_parallelogram(a->corner, b->corner, extent, all)) {
+        pti_is_parallelogram(a->corner, b->corner, (double)scene->wide.extent, all)) {
         b->id++;
         pti_write_plane(plane, lane % 8, all, 4, 1);
         return 2;
@@ -5598,21 +5611,12 @@ static uint32_t pti_write_flat(const pt_scene *scene, pti_small *out, uint32_t l
 static int pti_build_small(const pt_scene *scene, pt_wide *wide, uint32_t flats)
 {
     const uint32_t count = scene->primitive_count;
-    pti_bounds box = pti_bounds_empty();
     pti_small *out;
     uint32_t i, lane = 0;
-    double extent;
-    for (i = 0; i < count; i++) {
-        pti_primitive_box(scene, &scene->primitives[i], &wide->lo, &wide->hi);
-        pti_bounds_add(&box, wide->lo, wide->hi);
-    }
-    wide->lo = pt_v3((pt_real)box.lo[0], (pt_real)box.lo[1], (pt_real)box.lo[2]);
-    wide->hi = pt_v3((pt_real)box.hi[0], (pt_real)box.hi[1], (pt_real)box.hi[2]);
-    extent = fmax(pti_max3(box.lo[0], box.lo[1], box.lo[2]), pti_max3(box.hi[0], box.hi[1], box.hi[2]));
     if (!pti_alloc_arena(wide, sizeof *out, scene->alloc_user)) return 0;
     out = (pti_small *)(void *)wide->arena;
     for (i = 0; i < PTI_SMALL; i++) out->tag[i] = i;
-    for (i = 0; i < flats || lane % 8 > 0; lane++) i += pti_write_flat(scene, out, lane, i, flats, extent);
+    for (i = 0; i < flats || lane % 8 > 0; lane++) i += pti_write_flat(scene, out, lane, i, flats);
     wide->plane_blocks = (int)(lane / 8);
     for (i = 0; flats + i < count || i % 8 > 0; i++, lane++) {
         const uint32_t id = flats + i < count ? flats + i : count - 1;
@@ -5624,21 +5628,20 @@ static int pti_build_small(const pt_scene *scene, pt_wide *wide, uint32_t flats)
     return 1;
 }
 
-/* What pt_commit calls: 1, or 0 without memory, or -1 if there are more than 2^29 lanes. */
+/* What pt_commit calls: 1, or 0 without memory, or -1 if there are more than 2^29 lanes, or numbers too small or large. */
 static int pti_build_wide(const pt_scene *scene, pt_wide *wide)
 {
+    const double low = pti_max3((double)scene->lo.x, (double)scene->lo.y, (double)scene->lo.z);
+    const double high = pti_max3((double)scene->hi.x, (double)scene->hi.y, (double)scene->hi.z);
     uint32_t count[3] = {0, 0, 0}, flats, i;
-    double extent;
-    int built;
     memset(wide, 0, sizeof *wide);
+    wide->extent = (float)fmax(low, high);
     for (i = 0; i < scene->primitive_count; i++) count[scene->primitives[i].shape]++;
     flats = count[PT_SHAPE_TRIANGLE] + count[PT_SHAPE_PARALLELOGRAM];
     if ((size_t)scene->primitive_count + count[PT_SHAPE_PARALLELOGRAM] > (size_t)1 << 29) return -1;
-    if ((flats + 7) / 8 + (count[PT_SHAPE_SPHERE] + 7) / 8 <= PTI_SMALL / 8) built = pti_build_small(scene, wide, flats);
-    else built = pti_build_wide_tree(scene, wide, count[PT_SHAPE_TRIANGLE], 2 * count[PT_SHAPE_PARALLELOGRAM]);
-    extent = pti_max3((double)wide->lo.x, (double)wide->lo.y, (double)wide->lo.z);
-    wide->extent = (float)fmax(extent, pti_max3((double)wide->hi.x, (double)wide->hi.y, (double)wide->hi.z));
-    return built;
+    if (!(wide->extent > PTI_LEAST_SPAN / 256 && wide->extent < PTI_MOST_SPAN / 2)) return -1;
+    if ((flats + 7) / 8 + (count[PT_SHAPE_SPHERE] + 7) / 8 <= PTI_SMALL / 8) return pti_build_small(scene, wide, flats);
+    return pti_build_wide_tree(scene, wide, count[PT_SHAPE_TRIANGLE], 2 * count[PT_SHAPE_PARALLELOGRAM]);
 }
 
 /* rows[0] x + rows[1] y + rows[2] z + w */
@@ -5656,7 +5659,7 @@ typedef struct pti_planes8 {
 /* n.o + n3 is off by 36 u S (9 of these for the rounded corners of a parallelogram), n.d by 14 u m, so t by X = 96 u S / |n.d|.
    As |n.d| <= m, m X is at least 96 u S: so u, v and w are off by at most 3 G m X. Nothing is said of a lane where n is
    not known or where numbers overflow: NaN is not < 0. */
-PTI_INLINE pti_planes8 pti_plane_lanes(const pti_plane8 *p, const pti_ray8 *w, float limit, int any)
+PTI_INLINE8 pti_planes8 pti_plane_lanes(const pti_plane8 *p, const pti_ray8 *w, float limit, int any)
 {
     const pti_f8 ox = pti_f8_set(w->o[0]), oy = pti_f8_set(w->o[1]), oz = pti_f8_set(w->o[2]), zero = pti_f8_set(0);
     const pti_f8 dx = pti_f8_set(w->d[0]), dy = pti_f8_set(w->d[1]), dz = pti_f8_set(w->d[2]), one = pti_f8_set(1);
@@ -5701,6 +5704,9 @@ PTI_INLINE pti_f8 pti_f8_tag(pti_f8 x, const uint32_t *tag, pti_m8 m)
 #endif
 }
 
+/* The latest start of what is hit by a limit: 127 units of the last place are at most 2^-16 of it. */
+PTI_INLINE float pti_last_start(float limit) { return limit + limit * (256 * PTI_U); }
+
 /* Where the lanes begin, block by block. The lowest seven bits of a start are the entry that is to be tested: so no two are
    equal, and the least of them says who it is. */
 typedef struct pti_starts {
@@ -5719,24 +5725,20 @@ PTI_INLINE float pti_next_start(const pti_starts *s, float last)
 }
 
 /* Tests the entry that a start tells of and, near the diagonal of two triangles, the other, too. */
-PTI_INLINE int pti_test_start(const pt_scene *scene, const pti_ray *r, const pti_ray8 *w, const pti_starts *s, float start,
-                              float limit, pti_best *best)
+PTI_INLINE int pti_test_start(const pt_scene *scene, const pti_ray *r, const pti_starts *s, float start, pti_best *best)
 {
     const pti_small *small = (const pti_small *)(const void *)scene->wide.arena;
     const pti_tested *e;
     uint32_t at;
-    float error, clear;
     int hit;
     memcpy(&at, &start, sizeof at);
     at %= 2 * PTI_SMALL;
     e = &small->tested[at];
     if (e->corners == 0) return pti_test(scene, r, e->id, best);
-    error = s->error[at % PTI_SMALL / 8].v[at % 8];
-    clear = 4 * error * (w->span / w->reach);
-    hit = pti_test_flat(r, e->corner, e->corners, e->id, start > clear && start + clear < pti_ray8_before(limit), best);
-    if (fabsf(s->more[at % PTI_SMALL / 8].v[at % 8]) > 2 * error) return hit;
+    hit = pti_test_flat(r, e->corner, e->corners, e->id, best);
+    if (fabsf(s->more[at % PTI_SMALL / 8].v[at % 8]) > 2 * s->error[at % PTI_SMALL / 8].v[at % 8]) return hit;
     e = &small->tested[at ^ PTI_SMALL];
-    return hit | pti_test_flat(r, e->corner, e->corners, e->id, 0, best);
+    return hit | pti_test_flat(r, e->corner, e->corners, e->id, best);
 }
 
 PTI_INLINE int pti_search_small(const pt_scene *scene, const pti_ray *r, const pti_ray8 *w, pti_best *best, int any)
@@ -5747,7 +5749,7 @@ PTI_INLINE int pti_search_small(const pt_scene *scene, const pti_ray *r, const p
     const pti_f8 zero = pti_f8_set(0);
     pti_f8 least = pti_f8_set(HUGE_VALF), margin = zero;
     pti_starts s;
-    float start, limit = end;
+    float start, limit = pti_last_start(end);
     int found = 0, i;
     for (i = 0; i < planes; i++) {
         const pti_planes8 h = pti_plane_lanes(&small->planes[i], w, end, any);
@@ -5764,10 +5766,10 @@ PTI_INLINE int pti_search_small(const pt_scene *scene, const pti_ray *r, const p
     }
     s.count = planes + spheres;
     for (start = pti_f8_least(least); start <= limit; start = pti_next_start(&s, start)) {
-        if (!pti_test_start(scene, r, w, &s, start, end, best)) continue;
+        if (!pti_test_start(scene, r, &s, start, best)) continue;
         if (any) return 1;
         found = 1;
-        limit = pti_ray8_limit(w, best->t);
+        limit = pti_last_start(pti_ray8_limit(w, best->t));
     }
     return found;
 }
@@ -7726,57 +7728,66 @@ static int pti_commit_primitives(pt_scene *scene)
     return 1;
 }
 
-/* Widens a box by what rounding the origin of a ray that starts in the scene may move it: u times the largest
-   coordinate, and as much for each of the two roundings here. */
-static void pti_widen(pt_vec3 *lo, pt_vec3 *hi, const pti_bounds *all)
+/* Up to this many primitives are tested one by one: there a tree does not pay (make bench). */
+#define PTI_LINEAR_MAX 4
+
+static void pti_find_bounds(pt_scene *scene)
 {
-    pt_real e[3];
-    int k;
-    for (k = 0; k < 3; k++) e[k] = (pt_real)(3 * PTI_UNIT_ROUNDOFF * fmax(fabs(all->lo[k]), fabs(all->hi[k])));
-    *lo = pt_v3(lo->x - e[0], lo->y - e[1], lo->z - e[2]);
-    *hi = pt_v3(hi->x + e[0], hi->y + e[1], hi->z + e[2]);
+    uint32_t i;
+    pti_primitive_box(scene, &scene->primitives[0], &scene->lo, &scene->hi);
+    for (i = 1; i < scene->primitive_count; i++) {
+        pt_vec3 lo, hi;
+        pti_primitive_box(scene, &scene->primitives[i], &lo, &hi);
+        scene->lo = pti_lower(lo, scene->lo);
+        scene->hi = pti_upper(hi, scene->hi);
+    }
 }
 
-/* Bounds of the scene, and the binary tree if it is wanted. */
-static int pti_commit_binary(pt_scene *scene, int wanted)
+#if PTI_HAS_BVH
+/* Widens a box by what rounding the origin of a ray that starts in the scene may move it: u times the largest
+   coordinate, and as much for each of the two roundings here. */
+static void pti_widen(const pt_scene *scene, pt_vec3 *lo, pt_vec3 *hi)
 {
-    uint32_t n = scene->primitive_count, i;
+    const pt_vec3 a = scene->lo, b = scene->hi;
+    const pt_vec3 e = pt_v3((pt_real)(3 * PTI_UNIT_ROUNDOFF * fmax(fabs((double)a.x), fabs((double)b.x))),
+                            (pt_real)(3 * PTI_UNIT_ROUNDOFF * fmax(fabs((double)a.y), fabs((double)b.y))),
+                            (pt_real)(3 * PTI_UNIT_ROUNDOFF * fmax(fabs((double)a.z), fabs((double)b.z))));
+    *lo = pt_v3_sub(*lo, e);
+    *hi = pt_v3_add(*hi, e);
+}
+
+static int pti_commit_binary(pt_scene *scene)
+{
+    const uint32_t n = scene->primitive_count;
     pt_vec3 *boxes = (pt_vec3 *)pti_alloc(2 * (size_t)n, sizeof *boxes, scene->alloc_user);
-    pti_bounds all = pti_bounds_empty();
+    uint32_t i;
     int ok = boxes != NULL;
-    (void)wanted;
     for (i = 0; ok && i < n; i++) {
         pti_primitive_box(scene, &scene->primitives[i], &boxes[i], &boxes[n + i]);
-        pti_bounds_add(&all, boxes[i], boxes[n + i]);
+        pti_widen(scene, &boxes[i], &boxes[n + i]);
     }
-    for (i = 0; ok && i < n; i++) pti_widen(&boxes[i], &boxes[n + i], &all);
-    if (n > 0) {
-        scene->lo = pt_v3((pt_real)all.lo[0], (pt_real)all.lo[1], (pt_real)all.lo[2]);
-        scene->hi = pt_v3((pt_real)all.hi[0], (pt_real)all.hi[1], (pt_real)all.hi[2]);
-    }
-#if PTI_HAS_BVH
-    if (ok && wanted) ok = pt_bvh_build(&scene->bvh, boxes, boxes + n, n, scene->alloc_user) == PT_OK;
-#endif
+    ok = ok && pt_bvh_build(&scene->bvh, boxes, boxes + n, n, scene->alloc_user) == PT_OK;
     pti_free(boxes, scene->alloc_user);
     return ok;
 }
-
-/* Up to this many primitives are tested one by one: there a tree does not pay (make bench). */
-#define PTI_LINEAR_MAX 4
+#endif
 
 /* Bounds and a tree, if it pays. */
 static int pti_commit_tree(pt_scene *scene)
 {
     const int wanted = scene->primitive_count > PTI_LINEAR_MAX && scene->tree != PT_TREE_NONE;
+    if (scene->primitive_count > 0) pti_find_bounds(scene);
 #if PTI_HAS_WIDE
     if (wanted && scene->tree == PT_TREE_DEFAULT) {
         const int built = pti_build_wide(scene, &scene->wide);
-        scene->lo = scene->wide.lo;
-        scene->hi = scene->wide.hi;
         if (built >= 0) return built;
     }
 #endif
-    return pti_commit_binary(scene, wanted);
+#if PTI_HAS_BVH
+    if (wanted) return pti_commit_binary(scene);
+#endif
+    (void)wanted;
+    return 1;
 }
 
 /* Power of a light for its share of the samples: pi A L seen from one side, 4 pi I, that of a spot; from infinity
@@ -9281,7 +9292,8 @@ PTDEF pt_rgbd pt_li_branching(const pt_scene *scene, const pt_ray *ray, pt_sampl
    - Decisions are made in float. A hit point is put back on the plane of its primitive, in a distance of at least
      16 e from the primitive's edges, and the next ray starts 2 e above it; e is the bound of the distance of a computed
      point from its plane (derived at pti_lockstep_make). Primitives are wider by what rounding can do to a hit, so
-     that no ray passes between two that share an edge. Scenes with parts smaller than 4096 e are left to pti_path.
+     that no ray passes between two that share an edge. Scenes with parts smaller than 2048 e, or with edges sharper than
+     8 degrees, are left to pti_path. A ball that touches a wall is not seen from within sqrt(4 e r) of the contact.
 
    A shadow ray starts and ends on surfaces. A plane that has all surfaces on one side cannot come between two points
    of them: the walls of a room are not asked. Parallelograms whose edges follow two axes are tested by three
@@ -9635,6 +9647,29 @@ static int pti_lock_blocks(const pti_lock_item *q, const pti_lock_item *all, int
     return low < -e && high > e;
 }
 
+/* Do two flat items meet at an edge under an angle with a cosine above 0.99 (8 degrees)? There a point 16 e from the edge may be
+   less than 2 e from the other one. */
+static int pti_lock_wedge(const pti_lock_item *a, const pti_lock_item *b, double e)
+{
+    pti_d3 into[2];
+    int i, j, k;
+    for (i = 0; i < a->corners; i++)
+        for (j = 0; j < b->corners; j++) {
+            const pti_d3 t = pti_d_normalize(pti_d_between(b->c[j], b->c[(j + 1) % b->corners]));
+            const pti_d3 p = pti_d_between(b->c[j], a->c[i]), q = pti_d_between(b->c[j], a->c[(i + 1) % a->corners]);
+            const double x = pti_d_dot(p, t), y = pti_d_dot(q, t), end = pti_d_dot(pti_d_between(b->c[j], b->c[(j + 1) % b->corners]), t);
+            if (pti_d_length(pti_d_cross(p, t)) > e || pti_d_length(pti_d_cross(q, t)) > e) continue;
+            if (fmin(fmax(x, y), end) - fmax(fmin(x, y), 0) < e) continue; /* one beside the other */
+            for (k = 0; k < 2; k++) {
+                const pti_lock_item *s = k ? b : a;
+                const pti_d3 d = pti_d_between(b->c[j], s->c[((k ? j : i) + 2) % s->corners]);
+                into[k] = pti_d_normalize(pti_d_sub(d, pti_d_scale(t, pti_d_dot(d, t))));
+            }
+            if (pti_d_dot(into[0], into[1]) > 0.99) return 1;
+        }
+    return 0;
+}
+
 /* row: x, y, z, 1 of the distance of a point from the line through a along t, in the plane across n (unit). */
 static void pti_lock_row(float *row, pti_d3 n, pti_d3 t, pt_vec3 a)
 {
@@ -9764,7 +9799,11 @@ static int pti_lockstep_make(pti_lockstep *k, const pt_scene *scene, pt_vec3 eye
     k->e = (float)(17 * PTI_2_M24 * x);
     k->e_camera = (float)(17 * PTI_2_M24 * from);
     for (i = 0; i < scene->primitive_count; count++) i += pti_lock_collect(scene, i, x, &items[count]);
-    for (j = 0; j < count; j++) items[j].blocks = pti_lock_blocks(&items[j], items, count, (double)k->e);
+    for (j = 0; j < count; j++) {
+        items[j].blocks = pti_lock_blocks(&items[j], items, count, (double)k->e);
+        for (kind = 0; kind < j; kind++)
+            if (pti_lock_wedge(&items[j], &items[kind], 4 * (double)k->e)) return 0;
+    }
     for (kind = 0; kind < PTI_LOCK_CLASSES; kind++) {
         k->begin[kind] = n;
         for (blocks = 1; blocks >= 0; blocks--) {
@@ -9843,7 +9882,8 @@ PTI_INLINE pti_mw pti_lock_flats(const pti_lockstep *k, int kind, pti_w3 o, pti_
     return met;
 }
 
-/* As pti_sphere does it, for d of length 1. */
+/* As pti_sphere does it, for d of length 1. A ray that starts less than 5 e inside comes from something that touches the
+   ball, and does not see it. */
 PTI_INLINE pti_mw pti_lock_balls(const pti_lockstep *k, pti_w3 o, pti_w3 d, pti_lock_best *best, pti_mw met, const int any)
 {
     const pti_fw zero = pti_fw_set(0);
@@ -9856,7 +9896,8 @@ PTI_INLINE pti_mw pti_lock_balls(const pti_lockstep *k, pti_w3 o, pti_w3 d, pti_
         const pti_fw root = pti_fw_sqrt(pti_fw_max(square, zero)), c = pti_fw_mul(pti_fw_sub(far, r), pti_fw_add(far, r));
         const pti_fw q = pti_fw_select(pti_fw_lt(b, zero), pti_fw_sub(b, root), pti_fw_add(b, root)), t0 = pti_fw_div(c, q);
         const pti_fw first = pti_fw_min(t0, q), t = pti_fw_select(pti_fw_lt(zero, first), first, pti_fw_max(t0, q));
-        const pti_fw margin = pti_fw_select(pti_fw_lt(square, zero), pti_fw_set(-1), pti_fw_set(PTI_LOCK_FAR));
+        const pti_mw grazed = pti_mw_and(pti_fw_lt(c, zero), pti_fw_lt(pti_fw_sub(r, far), pti_fw_set(5 * k->e)));
+        const pti_fw margin = pti_fw_select(pti_mw_or(grazed, pti_fw_lt(square, zero)), pti_fw_set(-1), pti_fw_set(PTI_LOCK_FAR));
         const pti_mw hit = pti_lock_keep(best, t, margin, zero, i, any);
         if (any) met = pti_mw_or(met, hit);
     }
@@ -9947,7 +9988,7 @@ typedef struct pti_lock_surface {
     pti_uw i;
     pti_w3 p, n;            /* point, and normal on the side that the path came from                       */
     pti_fw cosine;          /* of the ray and that normal                                                  */
-    pti_mw met, front, ball; /* anything at all; from the side of ng; a sphere                             */
+    pti_mw met, front, ball, brim; /* anything at all; from the side of ng; a sphere; close to an edge     */
     pti_fw kind;
 } pti_lock_surface;
 
@@ -9972,10 +10013,11 @@ PTI_INLINE void pti_lock_land(const pti_lockstep *k, pti_w3 o, pti_w3 d, const p
     s->p = pti_w3_along(d, best->t, o);
     n = pti_gather3(k->of, PTI_OF_N, s->i);
     s->p = pti_w3_along(n, pti_fw_sub(zero, pti_w3_dot_add(n, s->p, pti_fw_gather(k->of[PTI_OF_D], s->i))), s->p);
-    if (pti_mw_bits(pti_fw_lt(best->margin, inset))) {
+    s->brim = pti_fw_lt(best->margin, inset);
+    if (pti_mw_bits(s->brim)) {
         const pti_fw depth = pti_fw_gather(k->of[PTI_OF_DEPTH], s->i);
-        const pti_fw share = pti_fw_max(zero, pti_fw_div(pti_fw_sub(inset, best->margin), pti_fw_sub(depth, best->margin)));
-        s->p = pti_w3_along(pti_w3_sub(pti_gather3(k->of, PTI_OF_CENTRE, s->i), s->p), share, s->p);
+        const pti_fw share = pti_fw_div(pti_fw_sub(inset, best->margin), pti_fw_sub(depth, best->margin));
+        s->p = pti_w3_along(pti_w3_sub(pti_gather3(k->of, PTI_OF_CENTRE, s->i), s->p), pti_fw_select(s->brim, share, zero), s->p);
     }
     s->ball = pti_fw_lt(pti_fw_set(1e38f), best->margin);
     if (pti_mw_bits(s->ball)) { /* n = 0 for spheres, so p is as it was */
@@ -10068,6 +10110,16 @@ PTI_INLINE void pti_lock_turn(pti_fw u, pti_fw *c, pti_fw *s)
     *s = pti_fw_sub(pti_fw_set(0), y);
 }
 
+/* How far along s->n the next ray starts, if it goes to w: 2 e off the surface, 8 e inside balls. A point of a wall that touches
+   a ball can start no more than 3 e inside it: so pti_lock_balls tells them apart. */
+PTI_INLINE pti_fw pti_lock_lift(const pti_lockstep *k, const pti_lock_surface *s, pti_w3 w)
+{
+    const pti_fw zero = pti_fw_set(0), along = pti_w3_dot(s->n, w);
+    const pti_fw out = pti_fw_select(s->front, along, pti_fw_sub(zero, along));
+    const pti_fw far = pti_fw_select(pti_mw_and(s->ball, pti_fw_lt(out, zero)), pti_fw_set(8 * k->e), pti_fw_set(2 * k->e));
+    return pti_fw_select(pti_fw_lt(along, zero), pti_fw_sub(zero, far), far);
+}
+
 /* What is known of the lights chosen; one light is the same for all lanes. */
 PTI_INLINE pti_fw pti_lit(const pti_lockstep *k, int row, pti_uw light)
 {
@@ -10079,8 +10131,8 @@ PTI_INLINE pti_w3 pti_lit3(const pti_lockstep *k, int row, pti_uw light)
 }
 
 /* A point of spheres: in the cone seen from p, or, from inside, in any direction. *q: the point, moved 2 e off to the side
-   of p; density per solid angle. */
-PTI_INLINE pti_fw pti_lock_ball_point(const pti_lockstep *k, pti_uw light, pti_w3 p, const pti_lock_numbers *u, pti_w3 *q)
+   of p; *to: the direction that was drawn, which from 2 e inside the sphere is not that of q; density per solid angle. */
+PTI_INLINE pti_fw pti_lock_ball_point(const pti_lockstep *k, pti_uw light, pti_w3 p, const pti_lock_numbers *u, pti_w3 *q, pti_w3 *to)
 {
     const pti_fw zero = pti_fw_set(0), one = pti_fw_set(1), r = pti_lit(k, PTI_LIT_RADIUS, light);
     const pti_w3 centre = pti_lit3(k, PTI_LIT_P, light), c = pti_w3_sub(centre, p);
@@ -10095,8 +10147,8 @@ PTI_INLINE pti_fw pti_lock_ball_point(const pti_lockstep *k, pti_uw light, pti_w
     axis = pti_w3_select(pti_fw_lt(zero, d), axis, pti_w3_make(zero, zero, one));
     pti_lock_frame(axis, &s, &v);
     pti_lock_turn(u->light1, &cosine, &sinus);
-    w = pti_w3_along(s, pti_fw_mul(sine, cosine), pti_w3_along(v, pti_fw_mul(sine, sinus), pti_w3_scale(axis, pti_fw_sub(one, x))));
-    w = pti_w3_normalize(pti_w3_sub(pti_w3_along(w, t, p), centre));
+    *to = pti_w3_along(s, pti_fw_mul(sine, cosine), pti_w3_along(v, pti_fw_mul(sine, sinus), pti_w3_scale(axis, pti_fw_sub(one, x))));
+    w = pti_w3_normalize(pti_w3_sub(pti_w3_along(*to, t, p), centre));
     *q = pti_w3_along(w, pti_fw_add(r, pti_fw_select(inside, pti_fw_set(-2 * k->e), pti_fw_set(2 * k->e))), centre);
     return pti_fw_div(pti_lit(k, PTI_LIT_DENSITY, light), pti_fw_mul(pti_fw_set((float)(2 * PT_PI)), omc));
 }
@@ -10120,9 +10172,9 @@ PTI_INLINE int pti_lock_direct(const pti_lockstep *k, const pti_lock_surface *s,
                                pti_lane_row *row, int technique, pt_heuristic heuristic)
 {
     const pti_fw zero = pti_fw_set(0), inverse_pi = pti_fw_set((float)(1 / PT_PI));
-    const pti_w3 o = pti_w3_along(s->n, pti_fw_set(2 * k->e), s->p);
+    const pti_w3 o = pti_w3_along(s->n, pti_lock_lift(k, s, s->n), s->p);
     pti_fw number = zero, density, distance2, distance, here, there, p, weight;
-    pti_w3 q, n, w;
+    pti_w3 q, n, w, to;
     pti_mw flat = pti_mw_of_bits(~0u);
     pti_lock_best end;
     pti_uw light;
@@ -10132,7 +10184,7 @@ PTI_INLINE int pti_lock_direct(const pti_lockstep *k, const pti_lock_surface *s,
     density = pti_lock_flat_point(k, light, u, &q, &n);
     if (k->sphere_lights) {
         pti_w3 ball;
-        const pti_fw per_angle = pti_lock_ball_point(k, light, s->p, u, &ball);
+        const pti_fw per_angle = pti_lock_ball_point(k, light, o, u, &ball, &to);
         flat = pti_fw_le(pti_lit(k, PTI_LIT_RADIUS, light), zero);
         q = pti_w3_select(flat, q, ball);
         density = pti_fw_select(flat, density, per_angle);
@@ -10141,7 +10193,7 @@ PTI_INLINE int pti_lock_direct(const pti_lockstep *k, const pti_lock_surface *s,
     distance2 = pti_w3_dot(w, w);
     distance = pti_fw_sqrt(distance2);
     w = pti_w3_scale(w, pti_fw_div(pti_fw_set(1), distance));
-    here = pti_w3_dot(s->n, w);
+    here = pti_w3_dot(s->n, k->sphere_lights ? pti_w3_select(flat, w, to) : w);
     there = pti_fw_sub(zero, pti_w3_dot(n, w));
     p = pti_fw_select(flat, pti_fw_div(pti_fw_mul(density, distance2), there), density);
     active = pti_mw_and(active, pti_mw_and(pti_fw_lt(zero, here), pti_fw_lt(zero, p)));
@@ -10174,7 +10226,9 @@ PTI_INLINE pti_w3 pti_lock_cosine(pti_w3 n, pti_fw u, pti_fw v, pti_fw *z)
     return pti_w3_normalize(pti_w3_along(n, *z, pti_w3_along(t, pti_fw_mul(r, pti_fw_select(wide, sine, cosine)), s)));
 }
 
-/* Mirrors and glass: the next direction, and what beta is multiplied by. */
+/* Mirrors and glass: the next direction, and what beta is multiplied by. Glass that is left within 16 e of an edge does not
+   bend: a face is wider than it is by rounding, and a ray that passes by could hit its back, be reflected into the glass
+   at an angle that no refraction gives, and never get out. */
 PTI_INLINE pti_w3 pti_lock_specular(const pti_lockstep *k, const pti_lock_surface *s, pti_w3 d, pti_fw u, pti_w3 *weight, pti_lane_row *row)
 {
     const pti_fw one = pti_fw_set(1), zero = pti_fw_set(0), two_cosines = pti_fw_add(s->cosine, s->cosine);
@@ -10185,14 +10239,16 @@ PTI_INLINE pti_w3 pti_lock_specular(const pti_lockstep *k, const pti_lock_surfac
     const pti_fw rp = pti_fw_div(pti_fw_nmadd(eta, other, s->cosine), pti_fw_madd(eta, other, s->cosine));
     const pti_fw half = pti_fw_mul(pti_fw_set(0.5f), pti_fw_madd(rs, rs, pti_fw_mul(rp, rp)));
     const pti_fw fresnel = pti_fw_select(pti_fw_lt(sine2, one), half, one);
-    const pti_mw bent = pti_mw_and(pti_lock_is(s, PT_MATERIAL_DIELECTRIC), pti_fw_le(fresnel, u));
+    const pti_mw glass = pti_lock_is(s, PT_MATERIAL_DIELECTRIC), brim = pti_mw_and(glass, s->brim);
+    const pti_fw side = pti_fw_select(s->front, one, zero), bend = pti_fw_select(brim, side, one); /* 0: straight on */
+    const pti_mw bent = pti_mw_and(glass, pti_fw_le(fresnel, pti_fw_mul(u, bend)));
     const pti_fw eta2 = pti_fw_mul(eta, eta);
     const pti_w3 mirrored = pti_w3_along(s->n, two_cosines, d);
     const pti_w3 refracted = pti_w3_along(s->n, pti_fw_nmadd(other, one, pti_fw_mul(eta, s->cosine)), pti_w3_scale(d, eta));
     const pti_w3 grey = pti_w3_make(pti_fw_select(bent, eta2, one), pti_fw_select(bent, eta2, one), pti_fw_select(bent, eta2, one));
-    *weight = pti_w3_select(pti_lock_is(s, PT_MATERIAL_DIELECTRIC), grey, *weight);
+    *weight = pti_w3_select(glass, grey, *weight);
     row[PTI_ROW_ETA2].f = pti_fw_select(bent, pti_fw_div(row[PTI_ROW_ETA2].f, eta2), row[PTI_ROW_ETA2].f);
-    return pti_w3_normalize(pti_w3_select(bent, refracted, mirrored));
+    return pti_w3_normalize(pti_w3_select(pti_fw_lt(zero, bend), pti_w3_select(bent, refracted, mirrored), d));
 }
 
 /* Russian roulette, as pti_roulette; the lanes that go on. */
@@ -10231,7 +10287,7 @@ typedef struct pti_lock_work {
 } pti_lock_work;
 
 /* The next edge of the paths in `row`, where `active`, as in pti_path; the lanes that go on. */
-PTI_INLINE unsigned pti_lock_vertex(pti_lock_work *w, pti_lane_row *row, unsigned active, const pti_lock_numbers *u, pti_fw u_roulette, float e)
+static unsigned pti_lock_vertex(pti_lock_work *w, pti_lane_row *row, unsigned active, const pti_lock_numbers *u, pti_fw u_roulette, float e)
 {
     const pti_lockstep *k = w->k;
     const pt_li_options *options = w->options;
@@ -10272,8 +10328,7 @@ PTI_INLINE unsigned pti_lock_vertex(pti_lock_work *w, pti_lane_row *row, unsigne
     if (options->roulette != PT_ROULETTE_NONE) go = pti_mw_and(go, pti_lock_roulette(options, row, &beta, u_roulette));
     pti_row3_set(row + PTI_ROW_BETA, beta);
     pti_row3_set(row + PTI_ROW_D, next);
-    cosine = pti_fw_select(pti_fw_lt(pti_w3_dot(s.n, next), zero), pti_fw_set(-2 * k->e), pti_fw_set(2 * k->e));
-    pti_row3_set(row + PTI_ROW_O, pti_w3_along(s.n, cosine, s.p));
+    pti_row3_set(row + PTI_ROW_O, pti_w3_along(s.n, pti_lock_lift(k, &s, next), s.p));
     row[PTI_ROW_DENSITY].f = density;
     row[PTI_ROW_EDGES].u = pti_uw_add(row[PTI_ROW_EDGES].u, pti_uw_set(1));
     return pti_mw_bits(go);

@@ -1006,6 +1006,7 @@ static pt_render_desc desc_of(const stage *s, const pt_lpe *lpe, const char *met
     d.seed = 5;
     d.li.max_edges = 6;
     d.li.lpe = lpe;
+    d.no_lockstep = 1; /* where classes are told apart, paths go one after the other */
     return d;
 }
 
