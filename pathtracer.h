@@ -56,6 +56,7 @@
        [PT-06] shapes and rays: intersection, error bounds, where the next ray starts
        [PT-07] bounding volume hierarchy
        [PT-07b] the wide tree: eight boxes or triangles at a time
+       [PT-07c] small scenes: eight planes or spheres at a time, without a tree
        [PT-08] materials (BSDFs)
        [PT-09] lights
        [PT-10] scene, camera, film
@@ -9542,7 +9543,7 @@ PTI_INLINE pti_w3 pti_w3_select(pti_mw m, pti_w3 a, pti_w3 b)
 PTI_INLINE pti_w3 pti_w3_set(const float v[3]) { return pti_w3_make(pti_fw_set(v[0]), pti_fw_set(v[1]), pti_fw_set(v[2])); }
 PTI_INLINE pti_w3 pti_w3_normalize(pti_w3 a) { return pti_w3_scale(a, pti_fw_div(pti_fw_set(1), pti_fw_sqrt(pti_w3_dot(a, a)))); }
 
-/* sin and cos of x in [-pi/4, pi/4], by their series: off by less than 2^-24. */
+/* sin and cos of x in [-pi/4, pi/4], by their series: off by less than 2^-24 and 2^-23. */
 PTI_INLINE void pti_fw_sincos(pti_fw x, pti_fw *s, pti_fw *c)
 {
     const pti_fw q = pti_fw_mul(x, x);
