@@ -5218,15 +5218,13 @@ PTI_INLINE int pti_ray8_make(pti_ray8 *w, const pti_ray *r, float extent)
 }
 
 /* One axis of boxes [Ize13]: with q = 1/d as rounded, face * q - o * q is off by at most 5 u (|t| + |o q|), and |t| up to the
-   end of the scene is at most S |q|. A direction so flat that q might overflow is taken as f = 2^-26 m, m the 1-norm of d: until
-   the end of the scene, at t <= 3 S / m, the ray moves by at most f t, so near faces come no later, and far ones are put off by
-   2 t. Both are less than the error of the faces themselves. */
+   end of the scene is at most S |q|: with the error of o, 7 u S |q|. A direction so flat that q might overflow is taken as
+   f = 2^-26 m, m the 1-norm of d: until the end of the scene, at t <= 3 S / m, the ray moves by at most f t either way, so that
+   faces are put off by at most 2 t <= 2 u S |q|. */
 PTI_INLINE void pti_ray8_axis(pti_ray8 *w, unsigned k)
 {
     const float flat = w->reach * 1.49011612e-8f;
-    const int is_flat = fabsf(w->d[k]) < flat;
-    const float q = 1 / (is_flat ? flat : w->d[k]), from = -w->o[k] * q;
-    const float off = 12 * PTI_U * w->span * fabsf(q) + (is_flat ? 7 * w->span / w->reach : 0);
+    const float q = 1 / (fabsf(w->d[k]) < flat ? flat : w->d[k]), from = -w->o[k] * q, off = 12 * PTI_U * w->span * fabsf(q);
     w->inverse[k] = q;
     w->near[k] = from - off;
     w->far[k] = from + off;
