@@ -176,9 +176,12 @@
        [Veg21] Vegdahl: Building a Better LK Hash, 2021
        [Vos91] Vose: A Linear Algorithm for Generating Random Numbers with a Given Distribution, 1991
        [Wal07] Walter, Marschner, Li, Torrance: Microfacet Models for Refraction, 2007
+       [Wal08] Wald, Benthin, Boulos: Getting Rid of Packets, IEEE Symposium on Interactive Ray Tracing, 2008
        [Wal26] Walsh: reflectance of diffuse light, 1926; see Duntley, J. Optical Society 32, 1942
        [Whi80] Whitted: An Improved Illumination Model for Shaded Display, 1980
        [Woo13] Woop, Benthin, Wald: Watertight Ray/Triangle Intersection, JCGT 2(1), 2013
+       [Yli17] Ylitie, Karras, Laine: Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs,
+               High-Performance Graphics 2017
 */
 
 #ifndef PATHTRACER_H
@@ -4422,32 +4425,6 @@ static void pti_fill(const pt_scene *scene, const pti_ray *r, const pti_best *be
    no split helps or all centres coincide, the list is halved; below depth 32 it always is, so no tree is deeper
    than 32 + log2(n) <= 63, and a fixed stack is enough. */
 
-/* A box of doubles that grows; areas of large boxes do not fit into float. */
-typedef struct pti_bounds {
-    double lo[3], hi[3];
-} pti_bounds;
-
-static pti_bounds pti_bounds_empty(void)
-{
-    pti_bounds b;
-    int k;
-    for (k = 0; k < 3; k++) {
-        b.lo[k] = HUGE_VAL;
-        b.hi[k] = -HUGE_VAL;
-    }
-    return b;
-}
-
-static void pti_bounds_add(pti_bounds *b, pt_vec3 lo, pt_vec3 hi)
-{
-    const double l[3] = {(double)lo.x, (double)lo.y, (double)lo.z}, h[3] = {(double)hi.x, (double)hi.y, (double)hi.z};
-    int k;
-    for (k = 0; k < 3; k++) {
-        if (l[k] < b->lo[k]) b->lo[k] = l[k];
-        if (h[k] > b->hi[k]) b->hi[k] = h[k];
-    }
-}
-
 PTI_INLINE pt_vec3 pti_lower(pt_vec3 a, pt_vec3 b)
 {
     return pt_v3(a.x < b.x ? a.x : b.x, a.y < b.y ? a.y : b.y, a.z < b.z ? a.z : b.z);
@@ -4476,6 +4453,32 @@ static void pti_primitive_box(const pt_scene *scene, const pt_primitive *p, pt_v
 }
 
 #if PTI_HAS_BVH
+
+/* A box of doubles that grows; areas of large boxes do not fit into float. */
+typedef struct pti_bounds {
+    double lo[3], hi[3];
+} pti_bounds;
+
+static pti_bounds pti_bounds_empty(void)
+{
+    pti_bounds b;
+    int k;
+    for (k = 0; k < 3; k++) {
+        b.lo[k] = HUGE_VAL;
+        b.hi[k] = -HUGE_VAL;
+    }
+    return b;
+}
+
+static void pti_bounds_add(pti_bounds *b, pt_vec3 lo, pt_vec3 hi)
+{
+    const double l[3] = {(double)lo.x, (double)lo.y, (double)lo.z}, h[3] = {(double)hi.x, (double)hi.y, (double)hi.z};
+    int k;
+    for (k = 0; k < 3; k++) {
+        if (l[k] < b->lo[k]) b->lo[k] = l[k];
+        if (h[k] > b->hi[k]) b->hi[k] = h[k];
+    }
+}
 
 #define PTI_BINS 16
 #define PTI_LEAF_MAX 8
@@ -5493,21 +5496,13 @@ PTI_INLINE int pti_traverse_wide(const pt_scene *scene, const pti_ray *r, const 
     }
 }
 
-#endif /* PTI_HAS_WIDE */
-
-/* =====================================================================================================
-   [PT-07c] SMALL SCENES: implementation
-   =====================================================================================================
-   Up to 64 primitives need no tree: every lane says where its primitive may begin, no later than the hit, and primitives are
-   tested by [PT-06] in that order, until what is left begins behind the nearest hit. That is one test for most rays, and
-   no branch that depends on the ray but the last.
+/* SMALL SCENES. Up to 64 primitives need no tree: every lane says where its primitive may begin, no later than the hit, and
+   primitives are tested by [PT-06] in that order, until what is left begins behind the nearest hit. That is one test for most
+   rays, and no branch that depends on the ray but the last.
 
    Memory is no matter here, so a lane keeps what saves time: the plane of its primitive and the weights of a point in it,
    as linear functions of the point. Two triangles in a row that make a parallelogram share a lane, as the sides of rooms and
    boxes mostly do. */
-
-#if PTI_HAS_WIDE
-
 #define PTI_SMALL 64        /* lanes, of planes, then of spheres                                           */
 
 /* The plane n.p + n3 = 0; weights u = U.p + U3, v = V.p + V3 and w = 1 - u - v of a point p in it, for a parallelogram
