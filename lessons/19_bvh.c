@@ -203,7 +203,7 @@ int main(int argc, char **argv)
     double mine[3], its[3];
     int areas = 1, same = 1;
     for (int k = 0; k < 3; k++) {
-        pt_scene scene = PT_SCENE_INIT;
+        pt_scene scene = {.tree = PT_TREE_BINARY};
         if (!make_scene(&scene, 8 << 2 * k)) return 1;
         uint32_t n = (uint32_t)rays, count = scene.triangle_count, few = (uint32_t)fmin(n, 16777216.0 / count);
         pt_bvh tree = {nodes, order, 1, count, 0};
