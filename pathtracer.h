@@ -56,10 +56,12 @@
        [PT-06] shapes and rays: intersection, error bounds, where the next ray starts
        [PT-07] bounding volume hierarchy
        [PT-07b] the wide tree: eight boxes or triangles at a time
+       [PT-07c] small scenes: eight planes or spheres at a time, without a tree
        [PT-08] materials (BSDFs)
        [PT-09] lights
        [PT-10] scene, camera, film
        [PT-11] integrators: path tracing, Whitted, distribution, branching; light-path expressions
+       [PT-11b] lockstep: path tracing of small scenes, 8 or 16 paths at a time
        [PT-17] files: pictures (PPM, PFM, PNG), films, models (OBJ with MTL)
        [PT-18] render driver: passes, threads, budgets, error against run time
        [PT-19] canonical scenes
@@ -77,7 +79,7 @@
        PT_NO_FILES         no files: pictures, films, tables; implies PT_NO_OBJ
        PT_NO_OBJ           no models from OBJ files
        PT_NO_BVH           linear search instead of a tree; implies that there is no wide one
-       PT_NO_SIMD          no lanes and no wide tree: the binary one, which is 3 to 5 times slower
+       PT_NO_SIMD          no lanes: the binary tree, which is 3 to 5 times slower, and paths one at a time
        PT_NO_INTRINSICS    lanes in plain C, also where the compiler aims at SSE2 or AVX2 (-mavx2 -mfma, -march=native)
        PT_NO_ENVIRONMENT   no light from the background
        PT_NO_MICROFACET    no rough metal and glass, no smooth metal, no Oren-Nayar
@@ -113,6 +115,9 @@
        Decisions (does this ray meet this sphere, which side of this edge) are made in double from
        the pt_real input. No constant is tuned to the size of a scene: rays start at an offset that
        follows from the rounding error of their own origin ([PT-06]). Sums over samples are double.
+       Small scenes of diffuse surfaces, mirrors and glass are rendered by paths that walk in lockstep
+       ([PT-11b]): they decide in float, between primitives that are wider by the rounding of a hit.
+       desc.no_lockstep asks for one path at a time; the two agree in the mean, not in their bits.
        Build with -ffp-contract=off when two builds or two instances of the path integrator must give
        the same bits: a fused multiply-add rounds once where two operations round twice, and a
        compiler may fuse differently in each copy. Hits and misses of triangles do not depend on it.
@@ -9538,7 +9543,7 @@ PTI_INLINE pti_w3 pti_w3_select(pti_mw m, pti_w3 a, pti_w3 b)
 PTI_INLINE pti_w3 pti_w3_set(const float v[3]) { return pti_w3_make(pti_fw_set(v[0]), pti_fw_set(v[1]), pti_fw_set(v[2])); }
 PTI_INLINE pti_w3 pti_w3_normalize(pti_w3 a) { return pti_w3_scale(a, pti_fw_div(pti_fw_set(1), pti_fw_sqrt(pti_w3_dot(a, a)))); }
 
-/* sin and cos of x in [-pi/4, pi/4], by their series: off by less than 2^-24. */
+/* sin and cos of x in [-pi/4, pi/4], by their series: off by less than 2^-24 and 2^-23. */
 PTI_INLINE void pti_fw_sincos(pti_fw x, pti_fw *s, pti_fw *c)
 {
     const pti_fw q = pti_fw_mul(x, x);
@@ -9573,7 +9578,7 @@ typedef struct pti_lockstep {
     /* classes 0, 1, 2: rectangles across x, y, z; parallelograms; triangles; spheres. Those of class c stand from begin[c] on,
        first those that can block a shadow ray, up to blockers[c] */
     int begin[PTI_LOCK_CLASSES + 1], blockers[PTI_LOCK_CLASSES];
-    float at[PTI_LOCK_MAX][16];     /* rectangle: place, then from, to along the next axis, and along the one after. Others: rows
+    float at[PTI_LOCK_MAX][16];     /* rectangle: place, from, to along the next axis, and along the one after, side of ng. Others: rows
                                        x, y, z, 1 of the height above the plane and of the distances from edges: two, and
                                        the distances of the opposite edges, or three. Sphere: centre, radius        */
     float of[PTI_OF_COUNT][PTI_LOCK_MAX], light[PTI_LIT_COUNT][PTI_LOCK_MAX], chosen[PTI_LOCK_MAX];
@@ -9710,6 +9715,7 @@ static double pti_lock_write_flat(const pti_lock_item *q, float *at)
         at[1 + 2 * k] = x < y ? x : y;
         at[2 + 2 * k] = x < y ? y : x;
     }
+    at[5] = (float)(q->kind == 0 ? n.x : q->kind == 1 ? n.y : n.z); /* 1 or -1 */
     return depth;
 }
 
@@ -9825,14 +9831,27 @@ static int pti_lockstep_make(pti_lockstep *k, const pt_scene *scene, pt_vec3 eye
 /* The nearest hit of a ray in each lane so far. */
 typedef struct pti_lock_best {
     pti_fw t, i, margin;    /* distance, number of the primitive, distance to its nearest edge              */
+    pti_fw key;             /* PTI_LOCK_CAREFUL: what they are ordered by                                  */
 } pti_lock_best;
 
-/* A primitive that is met at t, `margin` inside its edges. any: only whether, and whether before the end */
-PTI_INLINE pti_mw pti_lock_keep(pti_lock_best *best, pti_fw t, pti_fw margin, pti_fw slack, int i, const int any)
+/* What is asked: the nearest hit; whether there is any before best->t; the nearest, where it was met outside its edges. A ray
+   that passes outside a convex edge by less than rounding meets both planes there, the far one, from behind, before the
+   near one. So what is met by its slack alone is ordered by t - 2 slack from its front, t + 2 slack from behind. */
+enum { PTI_LOCK_NEAREST, PTI_LOCK_ANY, PTI_LOCK_CAREFUL };
+
+/* A primitive that is met at t, `margin` inside its edges; slack > 0 from its front. */
+PTI_INLINE pti_mw pti_lock_keep(pti_lock_best *best, pti_fw t, pti_fw margin, pti_fw slack, int i, const int how)
 {
     const pti_fw zero = pti_fw_set(0);
-    const pti_mw met = pti_mw_and(pti_mw_and(pti_fw_lt(zero, t), pti_fw_lt(t, best->t)), pti_fw_le(zero, pti_fw_add(margin, slack)));
-    if (any) return met;
+    pti_mw met = pti_mw_and(pti_fw_lt(zero, t), pti_fw_le(zero, pti_fw_add(margin, pti_fw_abs(slack))));
+    if (how == PTI_LOCK_CAREFUL) {
+        const pti_fw key = pti_fw_sub(t, pti_fw_select(pti_fw_lt(margin, zero), pti_fw_add(slack, slack), zero));
+        met = pti_mw_and(met, pti_mw_and(pti_fw_lt(key, best->key), pti_fw_lt(t, pti_fw_set(PTI_LOCK_FAR))));
+        best->key = pti_fw_select(met, key, best->key);
+    } else {
+        met = pti_mw_and(met, pti_fw_lt(t, best->t));
+    }
+    if (how == PTI_LOCK_ANY) return met;
     best->t = pti_fw_select(met, t, best->t);
     best->i = pti_fw_select(met, pti_fw_set((float)i), best->i);
     best->margin = pti_fw_select(met, margin, best->margin);
@@ -9840,10 +9859,10 @@ PTI_INLINE pti_mw pti_lock_keep(pti_lock_best *best, pti_fw t, pti_fw margin, pt
 }
 
 /* Rectangles across axis `kind`, whose coordinates are o.x, d.x after a turn of the axes. */
-PTI_INLINE pti_mw pti_lock_rectangles(const pti_lockstep *k, int kind, pti_w3 o, pti_w3 d, float e, pti_lock_best *best, pti_mw met, const int any)
+PTI_INLINE pti_mw pti_lock_rectangles(const pti_lockstep *k, int kind, pti_w3 o, pti_w3 d, float e, pti_lock_best *best, pti_mw met, const int how)
 {
-    const pti_fw inverse = pti_fw_div(pti_fw_set(1), d.x), slack = pti_fw_mul(pti_fw_abs(inverse), pti_fw_set(2 * e));
-    const int end = any ? k->blockers[kind] : k->begin[kind + 1];
+    const pti_fw inverse = pti_fw_div(pti_fw_set(1), d.x), slack = pti_fw_mul(inverse, pti_fw_set(-2 * e));
+    const int end = how == PTI_LOCK_ANY ? k->blockers[kind] : k->begin[kind + 1];
     int i;
     for (i = k->begin[kind]; i < end; i++) {
         const float *at = k->at[i];
@@ -9851,8 +9870,8 @@ PTI_INLINE pti_mw pti_lock_rectangles(const pti_lockstep *k, int kind, pti_w3 o,
         const pti_fw y = pti_fw_madd(t, d.y, o.y), z = pti_fw_madd(t, d.z, o.z);
         const pti_fw my = pti_fw_min(pti_fw_sub(y, pti_fw_set(at[1])), pti_fw_sub(pti_fw_set(at[2]), y));
         const pti_fw mz = pti_fw_min(pti_fw_sub(z, pti_fw_set(at[3])), pti_fw_sub(pti_fw_set(at[4]), z));
-        const pti_mw hit = pti_lock_keep(best, t, pti_fw_min(my, mz), slack, i, any);
-        if (any) met = pti_mw_or(met, hit);
+        const pti_mw hit = pti_lock_keep(best, t, pti_fw_min(my, mz), pti_fw_mul(slack, pti_fw_set(at[5])), i, how);
+        if (how == PTI_LOCK_ANY) met = pti_mw_or(met, hit);
     }
     return met;
 }
@@ -9862,9 +9881,9 @@ PTI_INLINE pti_fw pti_lock_height(const float *row, pti_w3 p)
     return pti_w3_dot_add(pti_w3_set(row), p, pti_fw_set(row[3]));
 }
 
-PTI_INLINE pti_mw pti_lock_flats(const pti_lockstep *k, int kind, pti_w3 o, pti_w3 d, float e, pti_lock_best *best, pti_mw met, const int any)
+PTI_INLINE pti_mw pti_lock_flats(const pti_lockstep *k, int kind, pti_w3 o, pti_w3 d, float e, pti_lock_best *best, pti_mw met, const int how)
 {
-    const int end = any ? k->blockers[kind] : k->begin[kind + 1];
+    const int end = how == PTI_LOCK_ANY ? k->blockers[kind] : k->begin[kind + 1];
     int i;
     for (i = k->begin[kind]; i < end; i++) {
         const float *at = k->at[i];
@@ -9876,15 +9895,15 @@ PTI_INLINE pti_mw pti_lock_flats(const pti_lockstep *k, int kind, pti_w3 o, pti_
         pti_mw hit;
         if (kind == PTI_LOCK_TRIANGLES) margin = pti_fw_min(margin, pti_lock_height(at + 12, p));
         else margin = pti_fw_min(margin, pti_fw_min(pti_fw_sub(pti_fw_set(at[12]), u), pti_fw_sub(pti_fw_set(at[13]), v)));
-        hit = pti_lock_keep(best, t, margin, pti_fw_mul(pti_fw_abs(inverse), pti_fw_set(2 * e)), i, any);
-        if (any) met = pti_mw_or(met, hit);
+        hit = pti_lock_keep(best, t, margin, pti_fw_mul(inverse, pti_fw_set(2 * e)), i, how);
+        if (how == PTI_LOCK_ANY) met = pti_mw_or(met, hit);
     }
     return met;
 }
 
 /* As pti_sphere does it, for d of length 1. A ray that starts less than 5 e inside comes from something that touches the
    ball, and does not see it. */
-PTI_INLINE pti_mw pti_lock_balls(const pti_lockstep *k, pti_w3 o, pti_w3 d, pti_lock_best *best, pti_mw met, const int any)
+PTI_INLINE pti_mw pti_lock_balls(const pti_lockstep *k, pti_w3 o, pti_w3 d, pti_lock_best *best, pti_mw met, const int how)
 {
     const pti_fw zero = pti_fw_set(0);
     int i;
@@ -9898,24 +9917,35 @@ PTI_INLINE pti_mw pti_lock_balls(const pti_lockstep *k, pti_w3 o, pti_w3 d, pti_
         const pti_fw first = pti_fw_min(t0, q), t = pti_fw_select(pti_fw_lt(zero, first), first, pti_fw_max(t0, q));
         const pti_mw grazed = pti_mw_and(pti_fw_lt(c, zero), pti_fw_lt(pti_fw_sub(r, far), pti_fw_set(5 * k->e)));
         const pti_fw margin = pti_fw_select(pti_mw_or(grazed, pti_fw_lt(square, zero)), pti_fw_set(-1), pti_fw_set(PTI_LOCK_FAR));
-        const pti_mw hit = pti_lock_keep(best, t, margin, zero, i, any);
-        if (any) met = pti_mw_or(met, hit);
+        const pti_mw hit = pti_lock_keep(best, t, margin, zero, i, how);
+        if (how == PTI_LOCK_ANY) met = pti_mw_or(met, hit);
     }
     return met;
 }
 
-/* All primitives against a ray in each lane, d of length 1. any: those that can block, before best->t. */
-PTI_INLINE pti_mw pti_lock_ask(const pti_lockstep *k, pti_w3 o, pti_w3 d, float e, pti_lock_best *best, const int any)
+/* All primitives against a ray in each lane, d of length 1. PTI_LOCK_ANY: those that can block. */
+PTI_INLINE pti_mw pti_lock_ask(const pti_lockstep *k, pti_w3 o, pti_w3 d, float e, pti_lock_best *best, const int how)
 {
     pti_mw met = pti_mw_of_bits(0);
-    if (k->begin[1] > k->begin[0]) met = pti_lock_rectangles(k, 0, o, d, e, best, met, any);
+    if (k->begin[1] > k->begin[0]) met = pti_lock_rectangles(k, 0, o, d, e, best, met, how);
     if (k->begin[2] > k->begin[1])
-        met = pti_lock_rectangles(k, 1, pti_w3_make(o.y, o.z, o.x), pti_w3_make(d.y, d.z, d.x), e, best, met, any);
+        met = pti_lock_rectangles(k, 1, pti_w3_make(o.y, o.z, o.x), pti_w3_make(d.y, d.z, d.x), e, best, met, how);
     if (k->begin[3] > k->begin[2])
-        met = pti_lock_rectangles(k, 2, pti_w3_make(o.z, o.x, o.y), pti_w3_make(d.z, d.x, d.y), e, best, met, any);
-    met = pti_lock_flats(k, PTI_LOCK_QUADS, o, d, e, best, met, any);
-    met = pti_lock_flats(k, PTI_LOCK_TRIANGLES, o, d, e, best, met, any);
-    return pti_lock_balls(k, o, d, best, met, any);
+        met = pti_lock_rectangles(k, 2, pti_w3_make(o.z, o.x, o.y), pti_w3_make(d.z, d.x, d.y), e, best, met, how);
+    met = pti_lock_flats(k, PTI_LOCK_QUADS, o, d, e, best, met, how);
+    met = pti_lock_flats(k, PTI_LOCK_TRIANGLES, o, d, e, best, met, how);
+    return pti_lock_balls(k, o, d, best, met, how);
+}
+
+/* The nearest hits. */
+static void pti_lock_nearest(const pti_lockstep *k, pti_w3 o, pti_w3 d, float e, pti_lock_best *best)
+{
+    best->t = best->margin = best->key = pti_fw_set(PTI_LOCK_FAR);
+    best->i = pti_fw_set(0);
+    pti_lock_ask(k, o, d, e, best, PTI_LOCK_NEAREST);
+    if (!pti_mw_bits(pti_fw_lt(best->margin, pti_fw_set(0)))) return;
+    best->t = best->margin = best->key;
+    pti_lock_ask(k, o, d, e, best, PTI_LOCK_CAREFUL);
 }
 
 /* --- numbers --- */
@@ -10200,10 +10230,10 @@ PTI_INLINE int pti_lock_direct(const pti_lockstep *k, const pti_lock_surface *s,
     for (i = (int)pti_mw_bits(active); i; i &= i - 1) rays++;
     if (rays == 0) return 0;
     end.t = distance;
-    end.i = end.margin = zero;
+    end.i = end.margin = end.key = zero;
     weight = pti_fw_div(pti_fw_mul(here, inverse_pi), p);
     if (technique == PTI_TECHNIQUE_MIS) weight = pti_fw_mul(weight, pti_lock_weight(p, pti_fw_mul(here, inverse_pi), heuristic));
-    weight = pti_fw_select(pti_lock_ask(k, o, w, k->e, &end, 1), zero, weight);
+    weight = pti_fw_select(pti_lock_ask(k, o, w, k->e, &end, PTI_LOCK_ANY), zero, weight);
     weight = pti_fw_select(active, weight, zero);
     albedo = pti_w3_mul(albedo, pti_w3_mul(pti_row3(row + PTI_ROW_BETA), pti_lit3(k, PTI_LIT_EMISSION, light)));
     pti_row3_set(row + PTI_ROW_SUM, pti_w3_along(albedo, weight, pti_row3(row + PTI_ROW_SUM)));
@@ -10298,9 +10328,7 @@ static unsigned pti_lock_vertex(pti_lock_work *w, pti_lane_row *row, unsigned ac
     pti_w3 weight, beta, next;
     pti_fw cosine, density;
     pti_mw go;
-    best.t = best.margin = pti_fw_set(PTI_LOCK_FAR);
-    best.i = zero;
-    pti_lock_ask(k, o, d, e, &best, 0);
+    pti_lock_nearest(k, o, d, e, &best);
     w->rays += (uint64_t)pti_count_bits(active);
     s.met = pti_mw_and(pti_mw_of_bits(active), pti_fw_lt(best.t, pti_fw_set(PTI_LOCK_FAR)));
     pti_lock_land(k, o, d, &best, &s);
