@@ -181,9 +181,12 @@
        [Veg21] Vegdahl: Building a Better LK Hash, 2021
        [Vos91] Vose: A Linear Algorithm for Generating Random Numbers with a Given Distribution, 1991
        [Wal07] Walter, Marschner, Li, Torrance: Microfacet Models for Refraction, 2007
+       [Wal08] Wald, Benthin, Boulos: Getting Rid of Packets, IEEE Symposium on Interactive Ray Tracing, 2008
        [Wal26] Walsh: reflectance of diffuse light, 1926; see Duntley, J. Optical Society 32, 1942
        [Whi80] Whitted: An Improved Illumination Model for Shaded Display, 1980
        [Woo13] Woop, Benthin, Wald: Watertight Ray/Triangle Intersection, JCGT 2(1), 2013
+       [Yli17] Ylitie, Karras, Laine: Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs,
+               High-Performance Graphics 2017
 */
 
 #ifndef PATHTRACER_H
@@ -4434,32 +4437,6 @@ static void pti_fill(const pt_scene *scene, const pti_ray *r, const pti_best *be
    no split helps or all centres coincide, the list is halved; below depth 32 it always is, so no tree is deeper
    than 32 + log2(n) <= 63, and a fixed stack is enough. */
 
-/* A box of doubles that grows; areas of large boxes do not fit into float. */
-typedef struct pti_bounds {
-    double lo[3], hi[3];
-} pti_bounds;
-
-static pti_bounds pti_bounds_empty(void)
-{
-    pti_bounds b;
-    int k;
-    for (k = 0; k < 3; k++) {
-        b.lo[k] = HUGE_VAL;
-        b.hi[k] = -HUGE_VAL;
-    }
-    return b;
-}
-
-static void pti_bounds_add(pti_bounds *b, pt_vec3 lo, pt_vec3 hi)
-{
-    const double l[3] = {(double)lo.x, (double)lo.y, (double)lo.z}, h[3] = {(double)hi.x, (double)hi.y, (double)hi.z};
-    int k;
-    for (k = 0; k < 3; k++) {
-        if (l[k] < b->lo[k]) b->lo[k] = l[k];
-        if (h[k] > b->hi[k]) b->hi[k] = h[k];
-    }
-}
-
 PTI_INLINE pt_vec3 pti_lower(pt_vec3 a, pt_vec3 b)
 {
     return pt_v3(a.x < b.x ? a.x : b.x, a.y < b.y ? a.y : b.y, a.z < b.z ? a.z : b.z);
@@ -4488,6 +4465,32 @@ static void pti_primitive_box(const pt_scene *scene, const pt_primitive *p, pt_v
 }
 
 #if PTI_HAS_BVH
+
+/* A box of doubles that grows; areas of large boxes do not fit into float. */
+typedef struct pti_bounds {
+    double lo[3], hi[3];
+} pti_bounds;
+
+static pti_bounds pti_bounds_empty(void)
+{
+    pti_bounds b;
+    int k;
+    for (k = 0; k < 3; k++) {
+        b.lo[k] = HUGE_VAL;
+        b.hi[k] = -HUGE_VAL;
+    }
+    return b;
+}
+
+static void pti_bounds_add(pti_bounds *b, pt_vec3 lo, pt_vec3 hi)
+{
+    const double l[3] = {(double)lo.x, (double)lo.y, (double)lo.z}, h[3] = {(double)hi.x, (double)hi.y, (double)hi.z};
+    int k;
+    for (k = 0; k < 3; k++) {
+        if (l[k] < b->lo[k]) b->lo[k] = l[k];
+        if (h[k] > b->hi[k]) b->hi[k] = h[k];
+    }
+}
 
 #define PTI_BINS 16
 #define PTI_LEAF_MAX 8
@@ -5230,15 +5233,13 @@ PTI_INLINE int pti_ray8_make(pti_ray8 *w, const pti_ray *r, float extent)
 }
 
 /* One axis of boxes [Ize13]: with q = 1/d as rounded, face * q - o * q is off by at most 5 u (|t| + |o q|), and |t| up to the
-   end of the scene is at most S |q|. A direction so flat that q might overflow is taken as f = 2^-26 m, m the 1-norm of d: until
-   the end of the scene, at t <= 3 S / m, the ray moves by at most f t, so near faces come no later, and far ones are put off by
-   2 t. Both are less than the error of the faces themselves. */
+   end of the scene is at most S |q|: with the error of o, 7 u S |q|. A direction so flat that q might overflow is taken as
+   f = 2^-26 m, m the 1-norm of d: until the end of the scene, at t <= 3 S / m, the ray moves by at most f t either way, so that
+   faces are put off by at most 2 t <= 2 u S |q|. */
 PTI_INLINE void pti_ray8_axis(pti_ray8 *w, unsigned k)
 {
     const float flat = w->reach * 1.49011612e-8f;
-    const int is_flat = fabsf(w->d[k]) < flat;
-    const float q = 1 / (is_flat ? flat : w->d[k]), from = -w->o[k] * q;
-    const float off = 12 * PTI_U * w->span * fabsf(q) + (is_flat ? 7 * w->span / w->reach : 0);
+    const float q = 1 / (fabsf(w->d[k]) < flat ? flat : w->d[k]), from = -w->o[k] * q, off = 12 * PTI_U * w->span * fabsf(q);
     w->inverse[k] = q;
     w->near[k] = from - off;
     w->far[k] = from + off;
@@ -5507,21 +5508,13 @@ PTI_INLINE int pti_traverse_wide(const pt_scene *scene, const pti_ray *r, const 
     }
 }
 
-#endif /* PTI_HAS_WIDE */
-
-/* =====================================================================================================
-   [PT-07c] SMALL SCENES: implementation
-   =====================================================================================================
-   Up to 64 primitives need no tree: every lane says where its primitive may begin, no later than the hit, and primitives are
-   tested by [PT-06] in that order, until what is left begins behind the nearest hit. That is one test for most rays, and
-   no branch that depends on the ray but the last.
+/* SMALL SCENES. Up to 64 primitives need no tree: every lane says where its primitive may begin, no later than the hit, and
+   primitives are tested by [PT-06] in that order, until what is left begins behind the nearest hit. That is one test for most
+   rays, and no branch that depends on the ray but the last.
 
    Memory is no matter here, so a lane keeps what saves time: the plane of its primitive and the weights of a point in it,
    as linear functions of the point. Two triangles in a row that make a parallelogram share a lane, as the sides of rooms and
    boxes mostly do. */
-
-#if PTI_HAS_WIDE
-
 #define PTI_SMALL 64        /* lanes, of planes, then of spheres                                           */
 
 /* The plane n.p + n3 = 0; weights u = U.p + U3, v = V.p + V3 and w = 1 - u - v of a point p in it, for a parallelogram
@@ -9792,7 +9785,7 @@ static double pti_lock_write(pti_lockstep *k, const pt_scene *scene, const pti_l
 static int pti_lockstep_make(pti_lockstep *k, const pt_scene *scene, pt_vec3 eye)
 {
     const unsigned taken = PT_NEEDS_TRIANGLES | PT_NEEDS_PARALLELOGRAMS | PT_NEEDS_SPHERES | PT_NEEDS_DIFFUSE | PT_NEEDS_MIRROR |
-                           PT_NEEDS_DIELECTRIC | PT_NEEDS_UVS | PT_NEEDS_AREA_LIGHTS;
+                           PT_NEEDS_DIELECTRIC | PT_NEEDS_UVS | PT_NEEDS_AREA_LIGHTS | PT_NEEDS_BVH;
     const double x = fmax(pti_max3((double)scene->lo.x, (double)scene->lo.y, (double)scene->lo.z),
                           pti_max3((double)scene->hi.x, (double)scene->hi.y, (double)scene->hi.z));
     const double from = fmax(x, pti_max3((double)eye.x, (double)eye.y, (double)eye.z));

@@ -310,6 +310,7 @@ symbols()
         'fopen|fclose|remove|rename|fsync|pt_write_.*|pt_read_image|pt_film_(read|write)|pt_load_obj|pt_report_write_.*|pti_(inflate|png|obj)_.*|pti_film_(head|put|plane)s?'
     gone PT_NO_OBJ -DPT_NO_OBJ 'pt_load_obj|pti_(obj|mtl|table|take_number)_?.*'
     gone PT_NO_BVH -DPT_NO_BVH 'pti?_bvh_.*'
+    gone PT_NO_SIMD -DPT_NO_SIMD 'pti_(build_(wide|small|binary)|find_parting|write_(tree|flat)|.*_lanes).*'
     gone PT_NO_ENVIRONMENT -DPT_NO_ENVIRONMENT 'pt_set_environment.*|pt_environment_radiance|pti_map_.*|pt_scene_pool'
     gone PT_NO_MICROFACET -DPT_NO_MICROFACET \
         'pt_material_(conductor|rough_dielectric|oren_nayar)|pti?_ggx_.*|pt_fresnel_conductor|pti_(eval|pdf|sample)_microfacet'

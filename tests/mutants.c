@@ -559,13 +559,40 @@ static const char *env_or(const char *variable, const char *otherwise)
     return value && value[0] ? value : otherwise;
 }
 
-/* Compiles a test program against the header of a directory; 1 if it compiled. Warnings do not count: a
-   mutant may leave something unused. */
-static int compile(const char *dir, const char *program)
+/* Compiles SOURCE of tests/ with the header of a directory; 1 if it compiled. Warnings do not count: a mutant may leave
+   something unused. */
+static int compile_source(const char *dir, const char *source, const char *flags, const char *out)
 {
-    return shell("%s -std=c99 -ffp-contract=off %s -w -I%s -I. -Itests tests/%s.c -o %s/%s -lm -pthread "
-                 "> %s/cc.log 2>&1",
-                 env_or("CC", "cc"), env_or("MUTANT_CFLAGS", "-O1"), dir, program, dir, program, dir);
+    return shell("%s -std=c99 -ffp-contract=off %s -w -I%s -I. -Itests %s tests/%s.c -o %s -lm -pthread > %s/cc.log 2>&1",
+                 env_or("CC", "cc"), env_or("MUTANT_CFLAGS", "-O1"), dir, flags, source, out, dir);
+}
+
+/* Does a test program bring its own implementation, to look at private functions? */
+static int is_alone(const char *program)
+{
+    char path[256], *text;
+    int alone;
+
+    name(path, sizeof path, "tests/%s.c", program);
+    text = read_file(path);
+    alone = !text || strstr(text, "PT_STATIC") || strstr(text, "PATHTRACER_IMPLEMENTATION") || strstr(text, ".c\"");
+    free(text);
+    return alone;
+}
+
+/* Builds a test program against the header of a directory; 1 if that went well. If only the implementation differs from the
+   project's, what most programs share is compiled once, and the programs themselves once for all mutants, in `unchanged`. */
+static int compile(const char *dir, const char *unchanged, const char *program, int shares)
+{
+    char out[256], object[256], implementation[256];
+
+    name(out, sizeof out, "%s/%s", dir, program);
+    if (!shares || is_alone(program)) return compile_source(dir, program, "", out);
+    name(object, sizeof object, "%s/%s.o", unchanged, program);
+    name(implementation, sizeof implementation, "%s/implementation.o", dir);
+    if (access(object, R_OK) != 0 && !compile_source(unchanged, program, "-c -DPT_TEST_LINKED", object)) return 0;
+    if (access(implementation, R_OK) != 0 && !compile_source(dir, "implementation", "-c", implementation)) return 0;
+    return shell("%s %s %s -o %s -lm -pthread > %s/cc.log 2>&1", env_or("CC", "cc"), implementation, object, out, dir);
 }
 
 /* Makes an empty directory in which a test finds what it expects in the project's top directory. */
@@ -678,7 +705,7 @@ static const char *what_is_unsound(runner *r, const char *test, int is_short, so
     program = r->tests[k];
     name(dir, sizeof dir, DIR "/unchanged%d", r->share); /* has no header in it: the project's is found */
     name(path, sizeof path, "%s/%s", dir, program);
-    if (access(path, X_OK) != 0 && !compile(dir, program)) return "does not compile with the header as it is";
+    if (access(path, X_OK) != 0 && !compile(dir, dir, program, 1)) return "does not compile with the header as it is";
     run(dir, test, is_short, 3600, &o);
     if (o.text[0]) return "fails on the header as it is";
     if (r->sound_count == MAX_SOUND) return "is one test too many";
@@ -695,11 +722,13 @@ static const char *what_is_unsound(runner *r, const char *test, int is_short, so
 /* Compiles program k against the mutant, once; compares it with the unchanged one. */
 static verdict build(runner *r, const mutant *m, int k)
 {
-    char dir[128];
+    char dir[128], unchanged[64];
+    const char *begin, *end;
 
     if (r->built[k] != INVALID) return r->built[k];
     name(dir, sizeof dir, DIR "/%s", m->name);
-    if (!compile(dir, r->tests[k])) return r->built[k] = NO_COMPILE;
+    name(unchanged, sizeof unchanged, DIR "/unchanged%d", r->share);
+    if (!compile(dir, unchanged, r->tests[k], section_range(r->header, "PT-00", &begin, &end) && r->header + m->at > begin)) return r->built[k] = NO_COMPILE;
     r->built[k] = shell("cmp -s %s/%s " DIR "/unchanged%d/%s", dir, r->tests[k], r->share, r->tests[k]) ? SAME_CODE : CAUGHT;
     return r->built[k];
 }
@@ -732,9 +761,9 @@ static int programs_in_order(const runner *r, const char *section, int order[MAX
     static const char *const likely[][2] = {
         {"PT-03", "test_numbers test_estimators"}, {"PT-04", "test_sampling test_radiometry"},
         {"PT-05", "test_numbers test_radiometry"}, {"PT-06", "test_geometry test_sampling"},
-        {"PT-07", "test_geometry"},                {"PT-08", "test_sampling test_input test_transport"},
-        {"PT-09", "test_sampling test_input test_transport"}, {"PT-10", "test_input test_sampling test_geometry test_driver"},
-        {"PT-11", "test_transport test_driver"},   {"", "test_input test_geometry test_numbers test_sampling test_estimators"}
+        {"PT-07", "test_geometry"},                {"PT-08", "test_materials test_sampling test_input"},
+        {"PT-09", "test_lights test_sampling test_input"}, {"PT-10", "test_input test_sampling test_geometry test_driver"},
+        {"PT-11", "test_methods test_driver test_transport"}, {"", "test_input test_geometry test_numbers test_sampling test_estimators"}
     };
     const char *p;
     unsigned taken = 0;

@@ -1079,6 +1079,7 @@ static void tree_is_linear_search(void)
         pt_scene scene = PT_SCENE_INIT;
         const int m = pt_add_material(&scene, pt_material_diffuse(pt_rgb_grey(1)));
         uint32_t degenerate = 0;
+        scene.tree = PT_TREE_BINARY; /* tests/test_wide.c has the others */
         if (c < 2) soup(&scene, &rng, 600, 1, c == 0 ? 0.15 : 1, m);
         if (c == 2) soup(&scene, &rng, 300, 1, 0.3, m);
         for (i = 0; c == 2 && i < 100; i++) {
@@ -1129,6 +1130,7 @@ static void ties(void)
     const int m = pt_add_material(&scene, pt_material_diffuse(pt_rgb_grey(1)));
     int i, wrong = 0;
     pt_hit hit;
+    scene.tree = PT_TREE_BINARY;
     for (i = 0; i < 40; i++)
         pt_add_sphere(&scene, real3(add(vec3(0, -5, 0), random_vec(&rng, 2))), (pt_real)0.5, m);
     for (i = 0; i < 3; i++)

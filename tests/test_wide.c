@@ -401,11 +401,11 @@ static void no_rays(void)
 {
     const float nan = HUGE_VALF - HUGE_VALF, odd[4] = {nan, HUGE_VALF, -HUGE_VALF, 0};
     pt_pcg32 rng = pt_pcg32_make(pt_test_seed(3), 4);
-    int count, i, hits = 0, far = 0;
+    int count, i, hits = 0, far = 0, other = 0;
     for (count = 40; count <= 400; count += 360) {
-        pt_scene s;
+        pt_scene s, none;
         pt_hit hit;
-        if (!make(&s, MIXED, count, v3(0, 0, 0), 1, PT_TREE_DEFAULT)) return;
+        if (!make(&s, MIXED, count, v3(0, 0, 0), 1, PT_TREE_DEFAULT) || !make(&none, MIXED, count, v3(0, 0, 0), 1, PT_TREE_NONE)) return;
         for (i = 0; i < 4096; i++) {
             const pt_vec3 to = landmark(&s, &rng);
             pt_ray ray = {{to.x, to.y, -5}, {0, 0, 1}, 1e30f};
@@ -415,15 +415,45 @@ static void no_rays(void)
             else ray.tmax = i % 4 ? i % 4 == 1 ? -1.0f : 0 : nan; /* nothing is nearer */
             hits += pt_intersect(&s, &ray, &hit) + pt_occluded(&s, &ray);
         }
-        for (i = 0; i < 40; i++) {
+        for (i = 0; i < 400; i++) {
             const pt_vec3 c = landmark(&s, &rng);
-            const pt_ray ray = {{c.x, c.y, -3e30f}, {0, 0, 1e-3f * (float)(i + 1)}, 3.4e38f};
-            far += pt_intersect(&s, &ray, &hit);
+            const pt_ray ray = {{c.x, c.y, -ldexpf(1, 20 + i % 100)}, {0, 0, 1e-3f * (float)(i + 1)}, 3.4e38f};
+            const int want = pt_intersect(&none, &ray, &hit);
+            far += want;
+            other += pt_intersect(&s, &ray, &hit) != want || pt_occluded(&s, &ray) != want;
         }
         pt_scene_free(&s);
+        pt_scene_free(&none);
     }
     pt_check(hits == 0, "rays of no numbers", "%d hit", hits);
-    pt_check(far > 20, "rays from 3e30", "only %d hit", far);
+    pt_check(far > 200 && other == 0, "rays from 2^20 to 2^119", "%d hit; %d differ from the linear search", far, other);
+}
+
+/* Rounded corners fold a parallelogram. Where a ray meets both halves, on the diagonal, the first one decides, whatever was
+   hit before. */
+static void folds(void)
+{
+    pt_pcg32 rng = pt_pcg32_make(pt_test_seed(6), 6);
+    int i, both = 0, wrong = 0;
+    for (i = 0; i < 40000; i++) {
+        const pt_parallelogram p = {in_cube(&rng, 1e6), in_cube(&rng, 4e5), in_cube(&rng, 4e5), 0};
+        const pt_vec3 d = v3(i % 3 - 1, i / 3 % 3 - 1, 1);
+        double t1, t2, t, u, v;
+        pt_vec3 c[4];
+        pt_ray ray;
+        pti_ray r;
+        pti_parallelogram_corners(&p, c);
+        ray.o = pt_v3_sub(pt_v3_scale(pt_v3_add(c[0], c[2]), (pt_real)0.5), pt_v3_scale(d, (pt_real)1e6));
+        ray.d = d;
+        ray.tmax = (pt_real)1e30;
+        r = pti_ray_make(&ray);
+        if (!pti_triangle(&r, &c[0], &c[1], &c[2], 1e30, &t1, &u, &v) || !pti_triangle(&r, &c[0], &c[2], &c[3], 1e30, &t2, &u, &v)) continue;
+        both++;
+        wrong += !pti_parallelogram(&r, c, 1e30, &t, &u, &v) || fabs(t - t1) > 0;
+        wrong += pti_parallelogram(&r, c, t1, &t, &u, &v);
+    }
+    pt_check(both > 20, "folded parallelograms", "only %d are met twice: the check is empty", both);
+    pt_check(wrong == 0, "folded parallelograms", "%d of %d are hit where the second half is", wrong, both);
 }
 
 /* ---- how good the bounds are ------------------------------------------------------------------------------- */
@@ -722,6 +752,7 @@ static int wide(int argc, char **argv)
     PT_TEST_EXACT(trees);
     PT_TEST_EXACT(scales);
     PT_TEST_EXACT(no_rays);
+    PT_TEST_EXACT(folds);
     PT_TEST_EXACT(bounds_of_triangles);
     PT_TEST_EXACT(bounds_of_planes);
     PT_TEST_EXACT(structure);
