@@ -223,16 +223,21 @@ static void same_bits(void)
         stage s = room(kinds[r]);
         pt_render_desc d = desc_of(&s, 37, 19, 7);
         pt_film first, other;
+        uint64_t rays, again;
         if (r == 1) d.sampler = PT_SAMPLER_INDEPENDENT;
         if (r == 2) d.single_net = 1;
         if (r == 2) d.camera.lens_radius = (pt_real)0.02;
-        first = render(&s, &d, 1, NULL);
+        first = render(&s, &d, 1, &rays);
+        for (i = 0, k = 0; i < 37 * 19; i++) k += memcmp(first.half[0] + 3 * i, first.half[1] + 3 * i, 3 * sizeof(double)) == 0;
+        pt_check(k < 37 * 19 / 2, room_names[kinds[r]], "%d of %d pixels are the same in both halves", k, 37 * 19);
         for (i = 0; i < 3; i++)
             for (k = 0; k < 4; k++) {
+                const char *name = label("%s, %d threads, tiles of %d", room_names[kinds[r]], threads[i], tile[k]);
                 d.threads = threads[i];
                 d.tile = tile[k];
-                other = render(&s, &d, 1, NULL);
-                pt_check(same_film(&first, &other), label("%s, %d threads, tiles of %d", room_names[kinds[r]], threads[i], tile[k]), "the films differ");
+                other = render(&s, &d, 1, &again);
+                pt_check(same_film(&first, &other), name, "the films differ");
+                pt_check(again == rays, name, "%.0f rays instead of %.0f: empty lanes count", (double)again, (double)rays);
                 pt_film_free(&other);
             }
         d.tile = 6;
