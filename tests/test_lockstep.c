@@ -11,10 +11,10 @@
 
 #if PTI_HAS_LOCKSTEP
 
-#ifdef LOCK_SELECTION
-#define WHOLE 0
+#ifdef LOCK_WIDTH
+#define WHOLE 0 /* checks that could differ with the lanes */
 #else
-#define WHOLE 1 /* all checks; else those that could differ with the lanes */
+#define WHOLE 1
 #endif
 
 /* ---- exact integrals: furnaces ------------------------------------------------------------------------------ */
@@ -74,27 +74,30 @@ static stage furnace(int kind, double rho)
 }
 
 /* Every path of k edges gives 1 + rho + ... + rho^(k-1), and walks k edges: not one may get out. Along the edges of things in the
-   room and where they touch, one in 10^5 edges may get in: those strips are some e = 1e-6 wide. */
+   room and where they touch, one in a million edges may get in, or between them and out: those strips are some e = 1e-6 wide. */
 static double walk_to_the_end(int kind, double rho, int k, uint32_t spp)
 {
-    const int width = 29, height = 23, may_refuse = kind == THIN_WEDGE, touching = kind == TOUCHING || kind == THINGS;
+    const int width = 29, height = 23, refusable = kind == THIN_WEDGE, touching = kind == TOUCHING || kind == THINGS;
     const double r = (double)(pt_real)rho, exact = (1 - pow(r, k)) / (1 - r), paths = (double)spp * width * height;
     const char *name = label("%s, %d edges", furnace_names[kind], k);
     stage s = furnace(kind, rho);
     pt_render_desc d = desc_of(&s, width, height, spp);
     pt_film film;
     uint64_t rays;
-    int wrong = 0, i;
+    int wrong = 0, i, h;
     d.method = "path-plain";
     d.li.max_edges = k;
     d.li.roulette = PT_ROULETTE_NONE;
-    film = render(&s, &d, may_refuse ? -1 : 1, &rays);
-    for (i = 0; i < 3 * width * height; i++) wrong += film.half[0][i] != film.half[0][0] || film.half[1][i] != film.half[0][0];
-    /* a path that got into a thing finds no light there, or leaves the room: it spoils the three sums of its pixel */
-    pt_check((double)rays == paths * k || (touching && (double)rays >= 0.999 * paths * k), name, "%.0f of %.0f edges are missing", paths * k - (double)rays, paths * k);
-    pt_check(wrong <= (touching ? 3e-5 * paths * k : 0), name, "%d of %d sums of pixels differ from the first, after %.0f edges", wrong, 6 * width * height, paths * k);
+    film = render(&s, &d, refusable ? -1 : 1, &rays);
+    for (h = 0; h < 2; h++)
+        for (i = 0; i < width * height; i++) wrong += memcmp(film.half[h] + 3 * i, film.half[0], 3 * sizeof film.half[0][0]) != 0;
+    pt_check((double)rays == paths * k || (touching && (double)rays >= (1 - 1e-6 * k) * paths * k), name, "%.0f of %.0f edges are missing", paths * k - (double)rays,
+             paths * k);
+    pt_check(wrong <= (touching ? 4 + 0.6e-6 * paths * k : 0), name, "%d of %d sums of pixels differ from the first, after %.0f edges", wrong, 2 * width * height,
+             paths * k);
     /* k products and k sums in float */
     pt_check(fabs(film.half[0][0] / (0.5 * spp) - exact) <= 2 * k * PTI_2_M24 * exact, name, "%.9g, exactly %.9g", film.half[0][0] / (0.5 * spp), exact);
+    if (pt_test.is_verbose) printf("       %s: %d wrong of %.0f\n", name, wrong, paths);
     pt_film_free(&film);
     pt_scene_free(&s.scene);
     return (double)rays;
@@ -105,9 +108,9 @@ static void no_way_out(void)
     double edges = 0;
     int kind;
     for (kind = 0; kind < FURNACES; kind++) {
-        const uint32_t few = pt_test_samples(WHOLE ? 64u : 32u) / 16 * 2;
-        edges += walk_to_the_end(kind, 0.999, 500, few);
-        if (WHOLE || kind == WEDGE) edges += walk_to_the_end(kind, 0.9, 10, 8 * few);
+        const uint32_t few = pt_test.is_short ? 1 : WHOLE ? 4 : 2, more = kind == THINGS ? 6 * few : few;
+        if (kind != THIN_WEDGE) edges += walk_to_the_end(kind, 0.999, 500, 2 * more);
+        if (WHOLE || kind == WEDGE) edges += walk_to_the_end(kind, 0.9, 10, kind == THIN_WEDGE ? 2 : 8 * few);
     }
     printf("edges walked in closed scenes: %.4g\n", edges);
 }
@@ -220,16 +223,21 @@ static void same_bits(void)
         stage s = room(kinds[r]);
         pt_render_desc d = desc_of(&s, 37, 19, 7);
         pt_film first, other;
+        uint64_t rays, again;
         if (r == 1) d.sampler = PT_SAMPLER_INDEPENDENT;
         if (r == 2) d.single_net = 1;
         if (r == 2) d.camera.lens_radius = (pt_real)0.02;
-        first = render(&s, &d, 1, NULL);
+        first = render(&s, &d, 1, &rays);
+        for (i = 0, k = 0; i < 37 * 19; i++) k += memcmp(first.half[0] + 3 * i, first.half[1] + 3 * i, 3 * sizeof(double)) == 0;
+        pt_check(k < 37 * 19 / 2, room_names[kinds[r]], "%d of %d pixels are the same in both halves", k, 37 * 19);
         for (i = 0; i < 3; i++)
             for (k = 0; k < 4; k++) {
+                const char *name = label("%s, %d threads, tiles of %d", room_names[kinds[r]], threads[i], tile[k]);
                 d.threads = threads[i];
                 d.tile = tile[k];
-                other = render(&s, &d, 1, NULL);
-                pt_check(same_film(&first, &other), label("%s, %d threads, tiles of %d", room_names[kinds[r]], threads[i], tile[k]), "the films differ");
+                other = render(&s, &d, 1, &again);
+                pt_check(same_film(&first, &other), name, "the films differ");
+                pt_check(again == rays, name, "%.0f rays instead of %.0f: empty lanes count", (double)again, (double)rays);
                 pt_film_free(&other);
             }
         d.tile = 6;
@@ -357,20 +365,968 @@ static void cancelled(void)
     pt_scene_free(&s.scene);
 }
 
+/* ---- time: no path is caught in glass -------------------------------------------------------------------------- */
+
+/* A ray that gets into glass at an angle that no refraction gives is reflected totally for ever. Edges of a box, seen from all
+   sides; a ball that touches the floor, seen at the contact; a ball that stands half in the floor. */
+static void not_caught(void)
+{
+    static const char *const names[3] = {"glass and mirror box", "glass ball on the floor", "glass ball in the floor"};
+    int kind, k;
+    for (kind = 0; kind < 3; kind++) {
+        stage s;
+        double edges = 0, paths = 0;
+        if (kind == 0) s = room(GLASS_BOX);
+        else {
+            memset(&s, 0, sizeof s);
+            add_walls(&s.scene, QUAD, &HERE);
+            add_lamp(&s.scene, &HERE, -0.5, 0.98, -0.6, 1, 0, lamp(&s.scene, 5, 5, 5));
+            add_ball(&s.scene, &HERE, 0, kind == 1 ? -0.6 : -1, -0.2, 0.4, pt_add_material(&s.scene, pt_material_dielectric((pt_real)1.5)));
+            s.camera = camera_at(&HERE, 0.5, kind == 1 ? -0.95 : -0.7, 0.5, kind == 1 ? 0 : 0.28, -1, kind == 1 ? -0.2 : 0.08, kind == 1 ? 0.4 : 1);
+            commit(&s);
+        }
+        for (k = 0; k < (kind == 0 ? 32 : 4); k++) {
+            pt_render_desc d = desc_of(&s, 9, 6, WHOLE && !pt_test.is_short ? 64 : 16);
+            uint64_t rays;
+            pt_film film;
+            d.seed = 301000u + (uint64_t)k;
+            d.li.max_edges = 100000;
+            film = render(&s, &d, 1, &rays);
+            edges += (double)rays;
+            paths += 9.0 * 6 * d.spp;
+            pt_film_free(&film);
+        }
+        pt_check(edges < 40 * paths, names[kind], "%.1f rays a path", edges / paths);
+        if (pt_test.is_verbose) printf("       %s: %.2f rays a path\n", names[kind], edges / paths);
+        pt_scene_free(&s.scene);
+    }
+}
+
+/* ---- lanes ------------------------------------------------------------------------------------------------ */
+
+static double between(pt_pcg32 *rng, double low, double high) { return low + (high - low) * pt_pcg32_double(rng); }
+
+static uint32_t odd_word(pt_pcg32 *rng)
+{
+    static const uint32_t odd[8] = {0, 1, 0x7fffffffu, 0x80000000u, 0xffffffffu, 0xfffffffeu, 0x55555555u, 0x0000ffffu};
+    const uint32_t k = pt_pcg32_next(rng) % 16;
+    return k < 8 ? odd[k] : pt_pcg32_next(rng);
+}
+
+static void words(void)
+{
+    static const char *const names[12] = {"add", "mul", "xor", "or", "and", "shl", "shr", "spread", "reverse", "set", "masks", "scramble"};
+    pt_pcg32 rng = pt_pcg32_make(pt_test_seed(1), 1);
+    int wrong[12] = {0}, i, k;
+    for (i = 0; i < (int)pt_test_samples(20000); i++) {
+        pti_lane_row x, y, r[12];
+        const int n = i % 32;
+        const unsigned all = ~0u >> (32 - PTI_WIDTH), a = pt_pcg32_next(&rng) & all, b = pt_pcg32_next(&rng) & all;
+        for (k = 0; k < PTI_WIDTH; k++) {
+            x.bits[k] = odd_word(&rng);
+            y.bits[k] = odd_word(&rng);
+        }
+        r[0].u = pti_uw_add(x.u, y.u);
+        r[1].u = pti_uw_mul(x.u, y.u);
+        r[2].u = pti_uw_xor(x.u, y.u);
+        r[3].u = pti_uw_or(x.u, y.u);
+        r[4].u = pti_uw_and(x.u, y.u);
+        r[5].u = pti_uw_shl(x.u, n);
+        r[6].u = pti_uw_shr(x.u, n);
+        r[7].u = pti_uw_spread(x.u);
+        r[8].u = pti_lock_reverse(x.u);
+        r[9].u = pti_uw_set(x.bits[i % PTI_WIDTH]);
+        r[11].u = pti_lock_scramble(x.u, y.u);
+        for (k = 0; k < PTI_WIDTH; k++) {
+            const uint32_t p = x.bits[k], q = y.bits[k];
+            wrong[0] += r[0].bits[k] != p + q;
+            wrong[1] += r[1].bits[k] != p * q;
+            wrong[2] += r[2].bits[k] != (p ^ q);
+            wrong[3] += r[3].bits[k] != (p | q);
+            wrong[4] += r[4].bits[k] != (p & q);
+            wrong[5] += r[5].bits[k] != p << n;
+            wrong[6] += r[6].bits[k] != p >> n;
+            wrong[7] += r[7].bits[k] != (p >> 31 ? 0xffffffffu : 0);
+            wrong[8] += r[8].bits[k] != pti_reverse_bits(p);
+            wrong[9] += r[9].bits[k] != x.bits[i % PTI_WIDTH];
+            wrong[11] += r[11].bits[k] != pti_laine_karras(p, q);
+        }
+        wrong[10] += pti_mw_bits(pti_mw_of_bits(a)) != a || pti_mw_bits(pti_mw_of_bits(~0u)) != all;
+        wrong[10] += pti_mw_bits(pti_mw_and(pti_mw_of_bits(a), pti_mw_of_bits(b))) != (a & b);
+        wrong[10] += pti_mw_bits(pti_mw_or(pti_mw_of_bits(a), pti_mw_of_bits(b))) != (a | b);
+    }
+    for (k = 0; k < 12; k++) pt_check(wrong[k] == 0, label("words of lanes, %s", names[k]), "%d lanes differ from C", wrong[k]);
+}
+
+static int same_float(float a, float b) { return memcmp(&a, &b, sizeof a) == 0 || (a != a && b != b); }
+
+/* Numbers that are likely to meet where it hurts. */
+static float odd_float(pt_pcg32 *rng)
+{
+    static const float odd[12] = {0, -0.0f, 1, -1, 1e-38f, -1e-44f, 3.4e38f, -3.4e38f, HUGE_VALF, -HUGE_VALF, 1.5f, 0.1f};
+    const unsigned k = pt_pcg32_next(rng) % 24;
+    if (k < 12) return odd[k];
+    if (k == 12) return HUGE_VALF - HUGE_VALF;
+    return (float)(between(rng, -1, 1) * pow(2, between(rng, -30, 30)));
+}
+
+static void floats(void)
+{
+    static const char *const names[14] = {"add", "sub", "mul", "div", "min", "max", "sqrt", "abs", "select", "lt", "le", "madd", "nmadd", "words and tables"};
+    pt_pcg32 rng = pt_pcg32_make(pt_test_seed(2), 2);
+    float table[64];
+    int wrong[14] = {0}, i, k;
+    for (k = 0; k < 64; k++) table[k] = odd_float(&rng);
+    for (i = 0; i < (int)pt_test_samples(20000); i++) {
+        pti_lane_row x, y, z, w, r[11], from, to, got;
+        unsigned less, at_most;
+        for (k = 0; k < PTI_WIDTH; k++) {
+            x.v[k] = odd_float(&rng);
+            y.v[k] = pt_pcg32_next(&rng) % 4 ? odd_float(&rng) : x.v[k];
+            z.v[k] = odd_float(&rng);
+            w.bits[k] = pt_pcg32_next(&rng) >> 8;
+        }
+        r[0].f = pti_fw_add(x.f, y.f);
+        r[1].f = pti_fw_sub(x.f, y.f);
+        r[2].f = pti_fw_mul(x.f, y.f);
+        r[3].f = pti_fw_div(x.f, y.f);
+        r[4].f = pti_fw_min(x.f, y.f);
+        r[5].f = pti_fw_max(x.f, y.f);
+        r[6].f = pti_fw_sqrt(x.f);
+        r[7].f = pti_fw_abs(x.f);
+        r[8].f = pti_fw_select(pti_fw_lt(x.f, y.f), x.f, z.f);
+        r[9].f = pti_fw_madd(x.f, y.f, z.f);
+        r[10].f = pti_fw_nmadd(x.f, y.f, z.f);
+        less = pti_mw_bits(pti_fw_lt(x.f, y.f));
+        at_most = pti_mw_bits(pti_fw_le(x.f, y.f));
+        from.f = pti_fw_from_words(w.u);
+        to.u = pti_uw_from_floats(pti_fw_add(from.f, pti_fw_set(0.25f)));
+        got.f = pti_fw_gather(table, pti_uw_and(w.u, pti_uw_set(63)));
+        for (k = 0; k < PTI_WIDTH; k++) {
+            const float a = x.v[k], b = y.v[k], c = z.v[k];
+            wrong[0] += !same_float(r[0].v[k], a + b);
+            wrong[1] += !same_float(r[1].v[k], a - b);
+            wrong[2] += !same_float(r[2].v[k], a * b);
+            wrong[3] += !same_float(r[3].v[k], a / b);
+            wrong[4] += memcmp(&r[4].v[k], a < b ? &a : &b, sizeof a) != 0;
+            wrong[5] += memcmp(&r[5].v[k], a > b ? &a : &b, sizeof a) != 0;
+            wrong[6] += !same_float(r[6].v[k], sqrtf(a));
+            wrong[7] += !same_float(r[7].v[k], fabsf(a));
+            wrong[8] += memcmp(&r[8].v[k], a < b ? &a : &c, sizeof a) != 0;
+            wrong[9] += (less >> k & 1) != (a < b);
+            wrong[10] += (at_most >> k & 1) != (a <= b);
+            wrong[11] += !same_float(r[9].v[k], a * b + c) && !same_float(r[9].v[k], fmaf(a, b, c));
+            wrong[12] += !same_float(r[10].v[k], c - a * b) && !same_float(r[10].v[k], fmaf(-a, b, c));
+            wrong[13] += !same_float(from.v[k], (float)w.bits[k]) || !same_float(got.v[k], table[w.bits[k] & 63]);
+            wrong[13] += w.bits[k] < 1u << 22 && to.bits[k] != w.bits[k];
+        }
+        wrong[9] += (less >> (PTI_WIDTH - 1) >> 1) != 0;
+        wrong[10] += (at_most >> (PTI_WIDTH - 1) >> 1) != 0;
+    }
+    for (k = 0; k < 14; k++) pt_check(wrong[k] == 0, label("floats of lanes, %s", names[k]), "%d lanes differ from C", wrong[k]);
+}
+
+/* The bounds of the series; pti_lock_turn doubles the angle twice, and with it the error. */
+static void angles(void)
+{
+    double worst[4] = {0, 0, 0, 0};
+    int i, k;
+    for (i = -50000; i < 50000; i++) {
+        pti_lane_row x, s, c;
+        for (k = 0; k < PTI_WIDTH; k++) x.v[k] = (float)(PT_PI / 4 * (i + k / (double)PTI_WIDTH) / 50000);
+        if (i + 1 == 50000) x.v[PTI_WIDTH - 1] = (float)(PT_PI / 4);
+        pti_fw_sincos(x.f, &s.f, &c.f);
+        for (k = 0; k < PTI_WIDTH; k++) {
+            worst[0] = fmax(worst[0], fabs((double)s.v[k] - sin((double)x.v[k])));
+            worst[1] = fmax(worst[1], fabs((double)c.v[k] - cos((double)x.v[k])));
+        }
+        for (k = 0; k < PTI_WIDTH; k++) x.v[k] = (float)((i + 50000 + k / (double)PTI_WIDTH) / 100000);
+        pti_lock_turn(x.f, &c.f, &s.f);
+        for (k = 0; k < PTI_WIDTH; k++) {
+            worst[2] = fmax(worst[2], fabs((double)s.v[k] - sin(2 * PT_PI * (double)x.v[k])));
+            worst[3] = fmax(worst[3], fabs((double)c.v[k] - cos(2 * PT_PI * (double)x.v[k])));
+        }
+    }
+    pt_check(worst[0] < PTI_2_M24 && worst[1] < 2 * PTI_2_M24, "sine and cosine", "off by %.3g and %.3g of 2^-24", worst[0] / PTI_2_M24, worst[1] / PTI_2_M24);
+    pt_check(worst[2] < 16 * PTI_2_M24 && worst[3] < 16 * PTI_2_M24, "sine and cosine of a turn", "off by %.3g and %.3g of 2^-24", worst[2] / PTI_2_M24,
+             worst[3] / PTI_2_M24);
+}
+
+/* ---- numbers --------------------------------------------------------------------------------------------------- */
+
+static void sobol_points(void)
+{
+    pt_pcg32 rng = pt_pcg32_make(pt_test_seed(3), 3);
+    int wrong = 0, i, d, k;
+    for (i = 0; i < 3000; i++)
+        for (d = 0; d < 4; d++) {
+            pti_lane_row n, x;
+            for (k = 0; k < PTI_WIDTH; k++) n.bits[k] = odd_word(&rng);
+            x.u = pti_lock_sobol(n.u, d);
+            for (k = 0; k < PTI_WIDTH; k++) wrong += x.bits[k] != pti_sobol_reversed(n.bits[k], d);
+        }
+    pt_check(wrong == 0, "Sobol points in lanes", "%d are others", wrong);
+}
+
+/* The numbers of the film and of the first vertex are those that pt_sampler has for these dimensions. */
+static void sampler_numbers(void)
+{
+    pt_pcg32 rng = pt_pcg32_make(pt_test_seed(4), 4);
+    int wrong[8] = {0}, i, lane, k;
+    stage s = room(SPHERES);
+    pti_lockstep ready;
+    pti_lock_work *work = (pti_lock_work *)calloc(1, sizeof *work);
+    if (!work || !pti_lockstep_make(&ready, &s.scene, s.camera.position)) {
+        pt_check(0, "numbers of the sampler", "no memory, or no scene for lanes");
+        return;
+    }
+    work->k = &ready;
+    for (i = 0; i < (int)pt_test_samples(2000); i++) {
+        const uint64_t seed = ((uint64_t)odd_word(&rng) << 32) | odd_word(&rng);
+        pt_sampler sampler = pt_sampler_make(PT_SAMPLER_SOBOL, seed, 0);
+        pti_lock_batch batch;
+        pti_lane_row row[PTI_ROWS], film[4], got[8];
+        pti_lock_numbers u;
+        uint64_t stream[PTI_WIDTH];
+        uint32_t index[PTI_WIDTH];
+        memset(&batch, 0, sizeof batch);
+        memset(row, 0, sizeof row);
+        for (lane = 0; lane < PTI_WIDTH; lane++) {
+            pti_lock_seeds seeds;
+            memset(&seeds, 0xff, sizeof seeds);
+            stream[lane] = i % 2 ? pt_pcg32_next(&rng) % 100000 : ((uint64_t)pt_pcg32_next(&rng) << 3);
+            index[lane] = i % 3 ? pt_pcg32_next(&rng) % 1000 : odd_word(&rng);
+            pti_lock_seed(&seeds, &sampler, stream[lane]);
+            pti_lock_lane(&batch, row, lane, &seeds, index[lane]);
+        }
+        pti_lock_draw(work, &batch, row, 1, 0, film, &u);
+        got[0].f = film[0].f;
+        got[1].f = film[1].f;
+        got[2].f = u.bsdf0;
+        got[3].f = u.bsdf1;
+        got[4].f = u.light0;
+        got[5].f = u.light1;
+        got[6].f = u.which;
+        got[7].f = u.lobe;
+        for (lane = 0; lane < PTI_WIDTH; lane++) {
+            static const uint32_t dimension[8] = {PT_DIM_FILM, PT_DIM_FILM + 1, 4 + PT_DIM_BSDF, 4 + PT_DIM_BSDF + 1, 4 + PT_DIM_LIGHT, 4 + PT_DIM_LIGHT + 1,
+                                                  4 + PT_DIM_LIGHT_CHOICE, 4 + PT_DIM_LOBE};
+            pt_sampler_start(&sampler, stream[lane], index[lane]);
+            for (k = 0; k < 8; k++) {
+                pt_sampler_seek(&sampler, dimension[k]);
+                wrong[k] += got[k].v[lane] != pt_sampler_1d(&sampler);
+            }
+        }
+    }
+    for (k = 0; k < 8; k++) pt_check(wrong[k] == 0, label("number %d of the sampler in lanes", k), "%d are others", wrong[k]);
+    free(work);
+    pt_scene_free(&s.scene);
+}
+
+/* xoroshiro64* as published, in C. */
+static uint32_t plain_xoroshiro(uint32_t s[2])
+{
+    const uint32_t result = s[0] * 0x9e3779bbu, t = s[1] ^ s[0];
+    s[0] = ((s[0] << 26) | (s[0] >> 6)) ^ t ^ (t << 9);
+    s[1] = (t << 13) | (t >> 19);
+    return result;
+}
+
+static void generator(void)
+{
+    pt_pcg32 rng = pt_pcg32_make(pt_test_seed(5), 5);
+    pti_lane_row a, b, x;
+    uint32_t state[PTI_WIDTH][2];
+    int wrong = 0, i, k;
+    for (k = 0; k < PTI_WIDTH; k++) {
+        state[k][0] = a.bits[k] = odd_word(&rng);
+        state[k][1] = b.bits[k] = odd_word(&rng) | 1u;
+    }
+    for (i = 0; i < 20000; i++) {
+        x.f = pti_lock_next(&a.u, &b.u);
+        for (k = 0; k < PTI_WIDTH; k++) wrong += x.v[k] != (float)(plain_xoroshiro(state[k]) >> 8) / 16777216 || !(x.v[k] < 1);
+    }
+    for (k = 0; k < PTI_WIDTH; k++) wrong += a.bits[k] != state[k][0] || b.bits[k] != state[k][1];
+    pt_check(wrong == 0, "xoroshiro64* in lanes", "%d numbers are others", wrong);
+}
+
+/* Pairs of numbers that must be independent: of one path, of neighbours in the picture, of samples in a row. 16 x 16 cells. */
+enum { PAIRS = 6 };
+static const char *const pair_names[PAIRS] = {"numbers 1 and 2 of a path",      "numbers 7 and 8",  "the first of neighbours", "the second of samples in a row",
+                                              "the first of both halves", "numbers 1 and 3, of seeds in a row"};
+
+static void first_numbers(uint64_t seed, uint64_t stream, uint32_t index, double x[8])
+{
+    pt_sampler sampler = pt_sampler_make(PT_SAMPLER_SOBOL, seed, 0);
+    pti_lock_seeds seeds;
+    pti_lock_batch batch;
+    pti_lane_row row[PTI_ROWS], value;
+    int k;
+    memset(&seeds, 0xff, sizeof seeds);
+    memset(row, 0, sizeof row);
+    pti_lock_seed(&seeds, &sampler, stream);
+    for (k = 0; k < PTI_WIDTH; k++) pti_lock_lane(&batch, row, k, &seeds, index);
+    for (k = 0; k < 8; k++) {
+        value.f = pti_lock_next(&row[PTI_ROW_A].u, &row[PTI_ROW_B].u);
+        x[k] = (double)value.v[k % PTI_WIDTH];
+    }
+}
+
+static void numbers_of_paths(void)
+{
+    static double observed[PAIRS][256], expected[256], all[2][256];
+    const int n = (int)pt_test_all_samples(120000);
+    const uint64_t seed = pt_test_seed(700000);
+    int i, k;
+    pt_test_source("uniform numbers");
+    memset(observed, 0, sizeof observed);
+    memset(all, 0, sizeof all);
+    for (i = 0; i < n; i++) {
+        double x[8], y[8], pair[PAIRS][2];
+        const uint64_t pixel = (uint64_t)i / 40, other = i % 4 == 0 ? 2 * pixel + 2 : i % 4 == 1 ? 2 * pixel : i % 4 == 2 ? 2 * pixel + 1 : 2 * pixel;
+        const uint32_t index = (uint32_t)i % 40;
+        first_numbers(seed, 2 * pixel, index, x);
+        if (i % 4 == 0) first_numbers(seed, other, index, y);                 /* the pixel on the right */
+        else if (i % 4 == 1) first_numbers(seed, other, index + 1, y);        /* the next sample        */
+        else if (i % 4 == 2) first_numbers(seed, other, index, y);            /* the other half         */
+        else first_numbers(seed + 1, other, index, y);
+        pair[0][0] = x[0], pair[0][1] = x[1];
+        pair[1][0] = x[6], pair[1][1] = x[7];
+        pair[2][0] = pair[4][0] = x[0], pair[2][1] = pair[4][1] = y[0];
+        pair[3][0] = x[1], pair[3][1] = y[1];
+        pair[5][0] = x[0], pair[5][1] = y[2];
+        for (k = 0; k < PAIRS; k++)
+            if (k < 2 || (k == 2 && i % 4 == 0) || (k == 3 && i % 4 == 1) || (k == 4 && i % 4 == 2) || (k == 5 && i % 4 == 3))
+                observed[k][(int)(16 * pair[k][0]) + 16 * (int)(16 * pair[k][1])]++;
+        for (k = 0; k < 8; k++) {
+            all[0][(int)(256 * x[k])]++;
+            all[1][(int)(65536 * x[k]) & 255]++; /* what comes below the first eight bits */
+        }
+    }
+    for (k = 0; k < PAIRS; k++) {
+        double total = 0;
+        for (i = 0; i < 256; i++) total += observed[k][i];
+        for (i = 0; i < 256; i++) expected[i] = total / 256;
+        pt_check_chi2(pair_names[k], observed[k], expected, 256, "paths share random numbers");
+    }
+    for (i = 0; i < 256; i++) expected[i] = 8.0 * n / 256;
+    pt_check_chi2("bits 0 to 7 of all", all[0], expected, 256, "not uniform");
+    pt_check_chi2("bits 8 to 15 of all", all[1], expected, 256, "not uniform");
+}
+
+/* ---- densities ------------------------------------------------------------------------------------------------- */
+
+static void set3(pti_lane_row row[3], int lane, pt_vec3 v)
+{
+    row[0].v[lane] = (float)v.x;
+    row[1].v[lane] = (float)v.y;
+    row[2].v[lane] = (float)v.z;
+}
+static pti_d3 get3(const pti_lane_row row[3], int lane) { return pti_d((double)row[0].v[lane], (double)row[1].v[lane], (double)row[2].v[lane]); }
+
+static pt_vec3 any_direction(pt_pcg32 *rng)
+{
+    const float x = (float)(pt_pcg32_next(rng) >> 8) / 16777216, y = (float)(pt_pcg32_next(rng) >> 8) / 16777216;
+    return pt_warp_sphere(pt_v2(x, y));
+}
+
+/* Cells of two numbers that are uniform in [0,1] if the density is right. */
+enum { CELLS = 24 };
+typedef struct cells {
+    double observed[CELLS * CELLS];
+    int n, out;
+} cells;
+static void count_cell(cells *c, double x, double y)
+{
+    c->n++;
+    if (!(x > -1e-5 && x < 1 + 1e-5 && y > -1e-5 && y < 1 + 1e-5)) c->out++;
+    else {
+        const int i = (int)fmin(fmax(CELLS * x, 0), CELLS - 1), j = (int)fmin(fmax(CELLS * y, 0), CELLS - 1);
+        c->observed[CELLS * i + j]++;
+    }
+}
+static void check_cells(const char *name, const cells *c)
+{
+    double expected[CELLS * CELLS];
+    int i;
+    for (i = 0; i < CELLS * CELLS; i++) expected[i] = (double)c->n / (CELLS * CELLS);
+    pt_check(c->out == 0, name, "%d of %d are where the density is 0", c->out, c->n);
+    pt_check_chi2(name, c->observed, expected, CELLS * CELLS, "samples do not follow their density");
+}
+
+/* Azimuth about n as a number in [0,1). */
+static double azimuth(pt_vec3 n, pti_d3 w)
+{
+    const pt_frame f = pt_frame_from_normal(n);
+    return (atan2(pti_d_dot(w, pti_d_from(f.t)), pti_d_dot(w, pti_d_from(f.s))) + PT_PI) / (2 * PT_PI);
+}
+
+static pti_fw draws(pt_pcg32 *rng)
+{
+    pti_lane_row r;
+    int k;
+    for (k = 0; k < PTI_WIDTH; k++) r.v[k] = (float)(pt_pcg32_next(rng) >> 8) / 16777216;
+    return r.f;
+}
+
+static void cosines(void)
+{
+    static cells c;
+    pt_pcg32 rng = pt_pcg32_make(pt_test_seed(710000), 6);
+    const int n = (int)pt_test_all_samples(20000);
+    double length = 0, off = 0;
+    int i, k, below = 0;
+    pt_test_source("density cos / pi");
+    memset(&c, 0, sizeof c);
+    for (i = 0; i < n; i++) {
+        pti_lane_row normal[3], out[3], z;
+        for (k = 0; k < PTI_WIDTH; k++) set3(normal, k, i % 50 ? any_direction(&rng) : v3(0, 0, k % 2 ? 1 : -1));
+        pti_row3_set(out, pti_lock_cosine(pti_row3(normal), draws(&rng), draws(&rng), &z.f));
+        for (k = 0; k < PTI_WIDTH; k++) {
+            const pti_d3 w = get3(out, k), m = get3(normal, k);
+            const double cosine = pti_d_dot(w, m);
+            length = fmax(length, fabs(pti_d_length(w) - 1));
+            off = fmax(off, fabs(cosine - (double)z.v[k]));
+            below += !(z.v[k] > 0) || !(cosine > -1e-6);
+            count_cell(&c, fmin(cosine * cosine, 1), azimuth(v3(m.x, m.y, m.z), w));
+        }
+    }
+    pt_check(length < 4 * PTI_2_M24 && off < 16 * PTI_2_M24 && below == 0, "directions by the cosine", "lengths off by %.3g, cosines by %.3g of 2^-24, %d from below",
+             length / PTI_2_M24, off / PTI_2_M24, below);
+    check_cells("directions by the cosine", &c);
+}
+
+/* Points of lights, and the density that goes with them. */
+static void lights(void)
+{
+    enum { FROM = 5 };
+    static const char *const names[FROM] = {"ball from outside", "ball from near by", "ball from inside", "parallelogram", "triangle"};
+    pt_pcg32 rng = pt_pcg32_make(pt_test_seed(720000), 7);
+    stage s;
+    pti_lockstep ready;
+    int kind, i, k;
+    memset(&s, 0, sizeof s);
+    add_ball(&s.scene, &HERE, 0.3, -0.2, 0.5, 0.4, lamp(&s.scene, 1, 1, 1));
+    pt_add_parallelogram(&s.scene, v3(1, 0.2, 0.1), v3(0.3, 0.5, -0.2), v3(-0.4, 0.1, 0.6), lamp(&s.scene, 2, 1, 0));
+    pt_add_triangle(&s.scene, v3(-1, 0.2, 0.1), v3(-0.3, 0.8, -0.2), v3(-0.4, 0.1, 0.9), lamp(&s.scene, 0, 1, 3));
+    commit(&s);
+    pt_test_source("uniform in the cone, or per area");
+    if (!pti_lockstep_make(&ready, &s.scene, v3(0, 0, 0))) {
+        pt_check(0, "lights", "not for lanes");
+        return;
+    }
+    for (kind = 0; kind < FROM; kind++) {
+        static cells c;
+        const int ball = kind < 3, n = (int)pt_test_all_samples(10000);
+        const pt_vec3 p = kind == 0 ? v3(-0.9, 1.2, 0.1) : kind == 1 ? v3(0.3, -0.2, 0.5 + 0.4 * 1.01) : v3(0.4, -0.3, 0.3);
+        double off = 0, height = 0, density = 0, exact;
+        int light = 0;
+        memset(&c, 0, sizeof c);
+        for (k = 0; k < ready.light_count; k++) {
+            const int is = ready.light[PTI_LIT_RADIUS][k] > 0 ? 0 : ready.light[PTI_LIT_TRIANGLE][k] > 0 ? 4 : 3;
+            if (is == (ball ? 0 : kind)) light = k;
+        }
+        for (i = 0; i < n; i++) {
+            pti_lane_row from[3], q[3], to[3], d;
+            pti_lock_numbers u;
+            const pti_d3 centre = pti_d(0.3, -0.2, 0.5);
+            memset(&u, 0, sizeof u);
+            u.light0 = draws(&rng);
+            u.light1 = draws(&rng);
+            for (k = 0; k < PTI_WIDTH; k++) set3(from, k, p);
+            if (ball) {
+                pti_w3 point, direction;
+                d.f = pti_lock_ball_point(&ready, pti_uw_set((uint32_t)light), pti_row3(from), &u, &point, &direction);
+                pti_row3_set(q, point);
+                pti_row3_set(to, direction);
+            } else {
+                pti_w3 point, normal;
+                d.f = pti_lock_flat_point(&ready, pti_uw_set((uint32_t)light), &u, &point, &normal);
+                pti_row3_set(q, point);
+                pti_row3_set(to, normal);
+            }
+            density = (double)d.v[0];
+            for (k = 0; k < PTI_WIDTH; k++) {
+                const pti_d3 at = get3(q, k), w = get3(to, k), eye = pti_d_from(p);
+                if (ball) {
+                    const double far = pti_d_length(pti_d_sub(at, centre)), side = kind == 2 ? -1 : 1;
+                    const pti_d3 c0 = pti_d_sub(centre, eye), axis = pti_d_normalize(c0);
+                    const double sine = 0.4 / pti_d_length(c0), omc = kind == 2 ? 2 : sine * sine / (1 + sqrt(1 - sine * sine));
+                    const pti_d3 way = pti_d_normalize(pti_d_sub(at, eye));
+                    height = fmax(height, fabs(far - 0.4 - side * 2 * (double)ready.e));
+                    off = fmax(off, pti_d_length(pti_d_sub(way, w)) * (pti_d_length(pti_d_sub(at, eye)) / (double)ready.e));
+                    count_cell(&c, (1 - pti_d_dot(w, axis)) / omc, azimuth(v3(axis.x, axis.y, axis.z), w));
+                } else {
+                    double corner[3], e1[3], e2[3], a, b, det;
+                    pti_d3 x, y, r;
+                    int j;
+                    for (j = 0; j < 3; j++) {
+                        corner[j] = (double)ready.light[PTI_LIT_P + j][light];
+                        e1[j] = (double)ready.light[PTI_LIT_E1 + j][light];
+                        e2[j] = (double)ready.light[PTI_LIT_E2 + j][light];
+                    }
+                    x = pti_d(e1[0], e1[1], e1[2]);
+                    y = pti_d(e2[0], e2[1], e2[2]);
+                    r = pti_d_sub(at, pti_d(corner[0], corner[1], corner[2]));
+                    height = fmax(height, fabs(pti_d_dot(r, pti_d_normalize(pti_d_cross(x, y))) - 2 * (double)ready.e));
+                    det = pti_d_dot(x, x) * pti_d_dot(y, y) - pti_d_dot(x, y) * pti_d_dot(x, y);
+                    a = (pti_d_dot(r, x) * pti_d_dot(y, y) - pti_d_dot(r, y) * pti_d_dot(x, y)) / det;
+                    b = (pti_d_dot(r, y) * pti_d_dot(x, x) - pti_d_dot(r, x) * pti_d_dot(x, y)) / det;
+                    if (kind == 3) count_cell(&c, a, b);
+                    else count_cell(&c, (a + b) * (a + b), a + b > 1e-4 ? b / (a + b) : 0.5);
+                }
+            }
+        }
+        {
+            double pmf = 0;
+            const double area = kind == 3 ? pti_d_length(pti_d_cross(pti_d(0.3, 0.5, -0.2), pti_d(-0.4, 0.1, 0.6)))
+                                          : 0.5 * pti_d_length(pti_d_cross(pti_d(0.7, 0.6, -0.3), pti_d(0.6, -0.1, 0.8)));
+            const double sine = 0.4 / pti_d_length(pti_d_between(p, v3(0.3, -0.2, 0.5))), omc = kind == 2 ? 2 : sine * sine / (1 + sqrt(1 - sine * sine));
+            for (k = 0; k < (int)s.scene.light_count; k++) {
+                const pt_shape shape = s.scene.primitives[s.scene.lights[k].primitive].shape;
+                if (shape == (ball ? PT_SHAPE_SPHERE : kind == 3 ? PT_SHAPE_PARALLELOGRAM : PT_SHAPE_TRIANGLE)) pmf = s.scene.lights[k].pmf;
+            }
+            exact = ball ? pmf / (2 * PT_PI * omc) : pmf / area;
+        }
+        pt_check(fabs(density - exact) <= 1e-5 * exact, names[kind], "density %.8g, exactly %.8g", density, exact);
+        pt_check(height <= (double)ready.e, names[kind], "points are off by %.3g e", height / (double)ready.e);
+        pt_check(!ball || off <= 8, names[kind], "the direction that was drawn is off by %.3g e", off);
+        check_cells(label("points of a %s", names[kind]), &c);
+    }
+    pt_scene_free(&s.scene);
+}
+
+/* Each light is chosen as often as its density says, the two triangles of a parallelogram as one. Each has a colour of its own. */
+static void choice(void)
+{
+    enum { LAMPS = 6 };
+    static const double red[LAMPS] = {1, 2, 3, 4, 0.001, 5};
+    double sum = 0;
+    pti_lockstep k;
+    stage s;
+    int m[LAMPS], i, wrong = 0, count = 0;
+    uint32_t j;
+    memset(&s, 0, sizeof s);
+    for (i = 0; i < LAMPS; i++) m[i] = lamp(&s.scene, red[i], 0.3, 0.2);
+    pt_add_quad(&s.scene, v3(0.1, 0, 0.3), v3(0.9, 0.2, 0.2), v3(0.8, 0.7, 0.6), v3(0, 0.5, 0.7), m[0]);
+    pt_add_triangle(&s.scene, v3(-1, 0.2, 0.1), v3(-0.3, 0.8, -0.2), v3(-0.4, 0.1, 0.9), m[1]);
+    pt_add_parallelogram(&s.scene, v3(1, -0.2, 0.1), v3(0, 0.5, 0), v3(0, 0, 0.6), m[2]);
+    add_ball(&s.scene, &HERE, 0.3, -0.2, 0.5, 0.4, m[3]);
+    add_ball(&s.scene, &HERE, -0.3, -0.2, 0.5, 0.2, m[4]);
+    pt_add_quad(&s.scene, v3(-1, -1, -1), v3(1, -1, -1), v3(1, -1, 1), v3(-1, -1, 1), m[5]);
+    commit(&s);
+    if (!pti_lockstep_make(&k, &s.scene, v3(0, 0, 0)) || k.light_count != LAMPS || k.sphere_lights != 2 || k.chosen[0] != 0) {
+        pt_check(0, "choice of lights", "%d lights", k.light_count);
+        return;
+    }
+    for (i = 0; i < LAMPS; i++) {
+        const double share = (i + 1 < LAMPS ? (double)k.chosen[i + 1] : 1) - (double)k.chosen[i];
+        const int flat = k.light[PTI_LIT_RADIUS][i] <= 0;
+        double pmf = 0, area = 0;
+        for (j = 0; j < s.scene.light_count; j++) {
+            const pt_light *l = &s.scene.lights[j];
+            if ((float)s.scene.materials[pti_primitive_material(&s.scene, &s.scene.primitives[l->primitive])].emission.r != k.light[PTI_LIT_EMISSION][i]) continue;
+            pmf += l->pmf;
+            area += l->area;
+            count++;
+        }
+        sum += share;
+        wrong += !(fabs(share - pmf) <= PTI_2_M24); /* two boundaries, each rounded to a multiple of 2^-24 */
+        wrong += fabs((double)k.light[PTI_LIT_DENSITY][i] - (flat ? share / area : share)) > 1e-6 * (flat ? share / area : share);
+    }
+    pt_check(wrong == 0 && count == 8 && fabs(sum - 1) < 1e-12, "choice of lights", "%d wrong, %d matched, in all %.9g", wrong, count, sum);
+    pt_scene_free(&s.scene);
+}
+
+/* ---- hits ------------------------------------------------------------------------------------------------------ */
+
+/* Some primitives in and around [-1,1]^3, each with a colour of its own, its number / 128. Things fit into a room. */
+enum { FEW = 20 };
+static int soup(stage *s, pt_pcg32 *rng, int walls)
+{
+    int i;
+    memset(s, 0, sizeof *s);
+    for (i = 0; i < 64; i++) diffuse(&s->scene, (i + 1) / 128.0, 0.5, 0.5);
+    for (i = 0; i < FEW; i++) {
+        const int kind = (int)(pt_pcg32_next(rng) % 5), axis = (int)(pt_pcg32_next(rng) % 3);
+        const pt_vec3 at = v3(between(rng, -0.7, 0.7), between(rng, -0.7, 0.7), between(rng, -0.7, 0.7));
+        const double size = between(rng, 0.05, 0.5);
+        const pt_vec3 a = pt_v3_scale(any_direction(rng), (pt_real)size), b = pt_v3_scale(any_direction(rng), (pt_real)size);
+        const double x[3] = {size, 0, 0}, y[3] = {0, size, 0};
+        if (kind == 0) pt_add_sphere(&s->scene, at, (pt_real)(0.5 * size), i);
+        if (kind == 1) pt_add_parallelogram(&s->scene, at, v3(x[axis], x[(axis + 1) % 3], x[(axis + 2) % 3]), v3(y[axis], y[(axis + 1) % 3], y[(axis + 2) % 3]), i);
+        if (kind == 2) pt_add_parallelogram(&s->scene, at, a, b, i);
+        if (kind == 3) pt_add_triangle(&s->scene, at, pt_v3_add(at, a), pt_v3_add(at, b), i);
+        if (kind == 4) pt_add_quad(&s->scene, at, pt_v3_add(at, a), pt_v3_add(pt_v3_add(at, a), b), pt_v3_add(at, b), i);
+    }
+    if (walls) {
+        const double low[3] = {-1.5, -1.5, -1.5}, high[3] = {1.5, 1.5, 1.5};
+        int m[6];
+        for (i = 0; i < 6; i++) m[i] = FEW + i;
+        add_box(&s->scene, PARALLELOGRAM, &HERE, low, high, (int)(pt_pcg32_next(rng) % 2), m);
+    }
+    return pt_commit(&s->scene) == PT_OK;
+}
+
+/* The same test in double from the rows that lanes have: distance along the ray, distance inside the edges, |cos|; for a sphere
+   those of the first root beyond 0, and how deep the ray goes into it. */
+typedef struct exact_hit {
+    double t, margin, cosine;
+} exact_hit;
+
+static double row_at(const float *row, pti_d3 p) { return (double)row[0] * p.x + (double)row[1] * p.y + (double)row[2] * p.z + (double)row[3]; }
+
+static exact_hit exact_test(const pti_lockstep *k, int i, pti_d3 o, pti_d3 d)
+{
+    const float *at = k->at[i];
+    exact_hit h = {-1, -1, 1};
+    if (i >= k->begin[PTI_LOCK_SPHERES]) {
+        const pti_d3 f = pti_d_sub(o, pti_d((double)at[0], (double)at[1], (double)at[2]));
+        const double b = -pti_d_dot(f, d), l = pti_d_length(pti_d_add(f, pti_d_scale(d, b))), r = (double)at[3];
+        const double root = sqrt(fmax(0, (r - l) * (r + l)));
+        h.t = b - root > 0 ? b - root : b + root;
+        h.margin = r - l;
+        h.cosine = root / r;
+    } else if (i < k->begin[PTI_LOCK_QUADS]) {
+        const int axis = i < k->begin[1] ? 0 : i < k->begin[2] ? 1 : 2;
+        const double oo[3] = {o.x, o.y, o.z}, dd[3] = {d.x, d.y, d.z};
+        double y, z;
+        h.t = ((double)at[0] - oo[axis]) / dd[axis];
+        y = oo[(axis + 1) % 3] + h.t * dd[(axis + 1) % 3];
+        z = oo[(axis + 2) % 3] + h.t * dd[(axis + 2) % 3];
+        h.margin = fmin(fmin(y - (double)at[1], (double)at[2] - y), fmin(z - (double)at[3], (double)at[4] - z));
+        h.cosine = fabs(dd[axis]);
+    } else {
+        const double slope = row_at(at, d) - (double)at[3];
+        pti_d3 p;
+        h.t = -row_at(at, o) / slope;
+        p = pti_d_add(o, pti_d_scale(d, h.t));
+        h.margin = fmin(row_at(at + 4, p), row_at(at + 8, p));
+        if (i >= k->begin[PTI_LOCK_TRIANGLES]) h.margin = fmin(h.margin, row_at(at + 12, p));
+        else h.margin = fmin(h.margin, fmin((double)at[12] - row_at(at + 4, p), (double)at[13] - row_at(at + 8, p)));
+        h.cosine = fabs(slope);
+    }
+    return h;
+}
+
+/* How far e can move a hit along the ray, and a sphere's twice as far. */
+static double blur(const pti_lockstep *k, int i, const exact_hit *h)
+{
+    return (i >= k->begin[PTI_LOCK_SPHERES] ? 2 : 1) * (double)k->e / fmax(h->cosine, 1e-9);
+}
+
+/* No edge so near that the lanes' slack of 2 blur decides, no beginning or end, and no other hit where the nearest is: then lanes
+   must say what [PT-06] says. */
+static int is_clear(const pti_lockstep *k, pti_d3 o, pti_d3 d, double nearest, double end)
+{
+    int i;
+    for (i = 0; i < k->begin[PTI_LOCK_CLASSES]; i++) {
+        const exact_hit h = exact_test(k, i, o, d);
+        const double b = blur(k, i, &h), edge = i >= k->begin[PTI_LOCK_SPHERES] ? 4 * (double)k->e : 3 * b;
+        if (!(h.t > -b && h.t < nearest + b) || h.margin < -edge) continue;
+        if (h.margin < edge || h.t < b || fabs(h.t - end) < b || (fabs(h.t - nearest) < b && fabs(h.t - nearest) > 1e-9)) return 0;
+    }
+    return 1;
+}
+
+static double exact_nearest(const pti_lockstep *k, pti_d3 o, pti_d3 d, int *which)
+{
+    double best = HUGE_VAL;
+    int i;
+    *which = -1;
+    for (i = 0; i < k->begin[PTI_LOCK_CLASSES]; i++) {
+        const exact_hit h = exact_test(k, i, o, d);
+        if (h.t > 0 && h.t < best && h.margin >= 0) best = h.t, *which = i;
+    }
+    return best;
+}
+
+static void hits(void)
+{
+    pt_pcg32 rng = pt_pcg32_make(pt_test_seed(6), 8);
+    const int scenes = WHOLE && !pt_test.is_short ? 60 : 15;
+    int wrong = 0, misplaced = 0, unclear = 0, rays = 0, met = 0, n, i, k;
+    double worst = 0;
+    for (n = 0; n < scenes; n++) {
+        pti_lockstep ready;
+        stage s;
+        if (!soup(&s, &rng, n % 2)) {
+            pt_check(0, "soup", "%s", pt_scene_error(&s.scene));
+            return;
+        }
+        if (!pti_lockstep_make(&ready, &s.scene, v3(2, 2, 2))) { /* a sliver may be too small */
+            pt_scene_free(&s.scene);
+            continue;
+        }
+        for (i = 0; i < 400; i++) {
+            pti_lane_row o[3], d[3], t, number;
+            pti_lock_best best;
+            for (k = 0; k < PTI_WIDTH; k++) {
+                set3(o, k, v3(between(&rng, -1.4, 1.4), between(&rng, -1.4, 1.4), between(&rng, -1.4, 1.4)));
+                set3(d, k, any_direction(&rng));
+                if (i % 20 == 0) set3(d, k, v3(i % 40 ? 1 : 0, 0, i % 40 ? 0 : -1)); /* along an axis */
+            }
+            best.t = best.margin = pti_fw_set(PTI_LOCK_FAR);
+            best.i = pti_fw_set(0);
+            pti_lock_ask(&ready, pti_row3(o), pti_row3(d), ready.e, &best, 0);
+            t.f = best.t;
+            number.f = best.i;
+            for (k = 0; k < PTI_WIDTH; k++) {
+                pt_ray ray;
+                pt_hit hit;
+                int which, hit_at_all;
+                const double nearest = exact_nearest(&ready, get3(o, k), get3(d, k), &which);
+                ray.o = pt_v3(o[0].v[k], o[1].v[k], o[2].v[k]);
+                ray.d = pt_v3(d[0].v[k], d[1].v[k], d[2].v[k]);
+                ray.tmax = (pt_real)HUGE_VAL;
+                rays++;
+                if (!is_clear(&ready, get3(o, k), get3(d, k), nearest, HUGE_VAL)) {
+                    unclear++;
+                    continue;
+                }
+                hit_at_all = pt_intersect(&s.scene, &ray, &hit);
+                wrong += hit_at_all != (t.v[k] < PTI_LOCK_FAR);
+                if (!hit_at_all || !(t.v[k] < PTI_LOCK_FAR)) continue;
+                met++;
+                wrong += hit.material != (int)(128 * ready.of[PTI_OF_ALBEDO][(int)number.v[k]] + 0.5f) - 1;
+                {
+                    const exact_hit h = exact_test(&ready, which, get3(o, k), get3(d, k));
+                    const double off = fabs((double)t.v[k] - (double)hit.t) / blur(&ready, which, &h);
+                    worst = fmax(worst, off);
+                    misplaced += !(off <= 1);
+                }
+            }
+        }
+        pt_scene_free(&s.scene);
+    }
+    pt_check(rays > 1500 * scenes && met > rays / 4 && unclear < rays / 500, "hits", "%d rays, %d hits, %d too close to call", rays, met, unclear);
+    pt_check(wrong == 0, "hits", "%d of %d are not those of pt_intersect", wrong, rays);
+    pt_check(misplaced == 0, "hits", "%d of %d are farther off than rounding can move them; at most %.3g of that", misplaced, met, worst);
+    if (pt_test.is_verbose) printf("       %d rays, %d hits, %d too close to call, t off by %.3g of its bound\n", rays, met, unclear, worst);
+}
+
+/* Between points of surfaces that see each other: is something in between? Walls of a room are not asked, and need not be. */
+static void shadows(void)
+{
+    pt_pcg32 rng = pt_pcg32_make(pt_test_seed(7), 9);
+    const int scenes = WHOLE && !pt_test.is_short ? 60 : 15;
+    int wrong = 0, unclear = 0, rays = 0, blocked = 0, left_out = 0, n, i, k;
+    for (n = 0; n < scenes; n++) {
+        pti_lockstep ready;
+        stage s;
+        if (!soup(&s, &rng, n % 4 != 3) || !pti_lockstep_make(&ready, &s.scene, v3(1, 1, 1))) {
+            pt_scene_free(&s.scene);
+            continue;
+        }
+        for (k = 0; k < PTI_LOCK_SPHERES; k++) left_out += ready.begin[k + 1] - ready.blockers[k];
+        for (i = 0; i < 300; i++) {
+            pti_lane_row o[3], d[3], q[2][3], normal[2][3], far;
+            pti_lock_best best;
+            unsigned met, landed[2];
+            int end;
+            for (end = 0; end < 2; end++) { /* two points of surfaces */
+                pti_lock_surface surface;
+                for (k = 0; k < PTI_WIDTH; k++) {
+                    set3(o, k, v3(between(&rng, -1.4, 1.4), between(&rng, -1.4, 1.4), between(&rng, -1.4, 1.4)));
+                    set3(d, k, any_direction(&rng));
+                }
+                best.t = best.margin = pti_fw_set(PTI_LOCK_FAR);
+                best.i = pti_fw_set(0);
+                pti_lock_ask(&ready, pti_row3(o), pti_row3(d), ready.e, &best, 0);
+                landed[end] = pti_mw_bits(pti_fw_lt(best.t, pti_fw_set(PTI_LOCK_FAR)));
+                surface.met = pti_mw_of_bits(landed[end]);
+                pti_lock_land(&ready, pti_row3(o), pti_row3(d), &best, &surface);
+                pti_row3_set(normal[end], surface.n);
+                pti_row3_set(q[end], pti_w3_along(surface.n, pti_lock_lift(&ready, &surface, surface.n), surface.p));
+            }
+            for (k = 0; k < PTI_WIDTH; k++) {
+                const pti_d3 way = pti_d_sub(get3(q[1], k), get3(q[0], k));
+                const double length = pti_d_length(way);
+                far.v[k] = (float)length;
+                set3(d, k, v3(way.x / length, way.y / length, way.z / length));
+            }
+            best.t = far.f;
+            met = pti_mw_bits(pti_lock_ask(&ready, pti_row3(q[0]), pti_row3(d), ready.e, &best, 1));
+            for (k = 0; k < PTI_WIDTH; k++) {
+                int which;
+                pt_ray ray;
+                const double nearest = exact_nearest(&ready, get3(q[0], k), get3(d, k), &which), length = (double)far.v[k];
+                if (!(landed[0] & landed[1] & 1u << k) || length < 0.01) continue;
+                if (!(pti_d_dot(get3(normal[0], k), get3(d, k)) > 0 && pti_d_dot(get3(normal[1], k), get3(d, k)) < 0)) continue; /* no light goes that way */
+                rays++;
+                if (!is_clear(&ready, get3(q[0], k), get3(d, k), fmin(nearest, length), length)) {
+                    unclear++;
+                    continue;
+                }
+                ray.o = pt_v3(q[0][0].v[k], q[0][1].v[k], q[0][2].v[k]);
+                ray.d = pt_v3(d[0].v[k], d[1].v[k], d[2].v[k]);
+                ray.tmax = far.v[k];
+                blocked += pt_occluded(&s.scene, &ray);
+                wrong += pt_occluded(&s.scene, &ray) != (int)(met >> k & 1);
+            }
+        }
+        pt_scene_free(&s.scene);
+    }
+    pt_check(rays > 600 * scenes && blocked > rays / 20 && blocked < rays - rays / 20 && unclear < rays / 50 && left_out > scenes, "shadows",
+             "%d rays, %d blocked, %d too close to call, %d planes not asked", rays, blocked, unclear, left_out);
+    pt_check(wrong == 0, "shadows", "%d of %d are not those of pt_occluded", wrong, rays);
+    if (pt_test.is_verbose) printf("       %d rays, %d blocked, %d too close to call, %d planes not asked\n", rays, blocked, unclear, left_out);
+}
+
+/* ---- what is left to paths one at a time ----------------------------------------------------------------------- */
+
+static void nobody(void *user, const char *word, int edges, pt_rgbd value)
+{
+    (void)user;
+    (void)word;
+    (void)edges;
+    (void)value;
+}
+
+enum {
+    EYE, PART, TEXTURE, SKY, MAP, POINT, SPOT, SUN, ROUGH, METAL, COAT, GLASS, NORMALS, AOV, LPE, OBSERVER, GENERAL, STRATIFIED, MANY, DIM, WHITTED, LONG_PATHS,
+    LATE, SWITCH, REFUSED
+};
+static const char *const refused_names[REFUSED] = {
+    "an eye far off", "a tiny part", "a texture", "a sky", "an environment image", "a point light", "a spot light", "a directional light", "rough diffuse",
+    "metal", "a coat", "rough glass", "shading normals", "auxiliary pictures", "light-path expressions", "an observer", "the general body", "the stratified sampler",
+    "65 primitives", "a light too dim for 24 bits", "another method", "paths of 2^24 edges", "roulette from 2^24 on", "no_lockstep"};
+
+static void add_refused(stage *s, int what)
+{
+    static const pt_texture checker = {PT_TEXTURE_CHECKER, NULL, 0, 0, {8, 8}, {(pt_real)0.25, (pt_real)0.25, (pt_real)0.25},
+                                       {(pt_real)0.75, (pt_real)0.75, (pt_real)0.75}, NULL, NULL};
+    static const float sky[6] = {1, 1, 1, 0.5f, 0.5f, 2};
+    const pt_vec3 corner[3] = {{0, 0, 0}, {(pt_real)0.3, 0, 0}, {0, (pt_real)0.3, 0}}, up[3] = {{0, 0, 1}, {(pt_real)0.1, 0, 1}, {0, 0, 1}};
+    const uint32_t index[3] = {0, 1, 2};
+    pt_material m = pt_material_diffuse(grey(0.5));
+    int k;
+    if (what == TEXTURE) m.texture = &checker;
+    if (what == ROUGH) m = pt_material_oren_nayar(grey(0.5), (pt_real)0.3);
+    if (what == METAL) m = pt_material_conductor(grey(1), grey(3), (pt_real)0.2);
+    if (what == COAT) m = pt_material_coat(grey(0.5), (pt_real)1.5);
+    if (what == GLASS) m = pt_material_rough_dielectric((pt_real)1.5, (pt_real)0.2);
+    if (what == DIM) m.emission = grey(1e-9);
+    k = pt_add_material(&s->scene, m);
+    if (what == NORMALS) pt_add_mesh(&s->scene, corner, up, NULL, 3, index, 1, k);
+    else add_ball(&s->scene, &HERE, 0, 0.4, 0, what == PART ? 0.002 : what == DIM ? 0.01 : 0.2, k);
+    for (k = 0; what == MANY && k < 65; k++) add_ball(&s->scene, &HERE, -0.9 + 0.2 * (k % 8), -0.9, -0.9 + 0.2 * (k / 8), 0.05, 0);
+    if (what == SKY) pt_set_environment(&s->scene, grey(1));
+    if (what == MAP) pt_set_environment_image(&s->scene, sky, 2, 1, 1);
+    if (what == POINT) pt_add_point_light(&s->scene, v3(0, 0.7, 0), grey(1));
+    if (what == SPOT) pt_add_spot_light(&s->scene, v3(0, 0.7, 0), v3(0, -1, 0), grey(1), 20, 40);
+    if (what == SUN) pt_add_directional_light(&s->scene, v3(0.1, -1, 0), grey(1));
+}
+
+static void refused(void)
+{
+    static const char *const words[1] = {"LDE"};
+    int what;
+    for (what = 0; what < REFUSED; what++) {
+        stage s = room(SPHERES);
+        pt_film film, plain;
+        pt_render_desc d;
+        pt_lpe lpe;
+        add_refused(&s, what);
+        commit(&s);
+        d = desc_of(&s, 12, 9, 2);
+        if (what == EYE) d.camera = pt_camera_look_at(v3(0, 0, 20000), v3(0, 0, 0), v3(0, 1, 0), (pt_real)0.01);
+        d.aov = what == AOV;
+        if (what == LPE && pt_lpe_compile(&lpe, words, 1, NULL) == PT_OK) d.li.lpe = &lpe;
+        if (what == OBSERVER) d.li.observer = nobody;
+        d.general_body = what == GENERAL;
+        if (what == STRATIFIED) d.sampler = PT_SAMPLER_STRATIFIED;
+        if (what == WHITTED) d.method = "whitted";
+        if (what == LONG_PATHS) d.li.max_edges = 1 << 24;
+        if (what == LATE) d.li.roulette_start = 1 << 24, d.li.roulette = PT_ROULETTE_CONSTANT, d.li.roulette_survival = (pt_real)0.5, d.li.max_edges = 9;
+        d.no_lockstep = what == SWITCH;
+        film = render(&s, &d, 0, NULL);
+        d.no_lockstep = 1;
+        plain = render(&s, &d, 0, NULL);
+        pt_check(same_film(&film, &plain), refused_names[what], "is another picture than that of paths one at a time");
+        pt_film_free(&film);
+        pt_film_free(&plain);
+        pt_scene_free(&s.scene);
+    }
+}
+
+/* Just inside of what it takes. */
+static void taken(void)
+{
+    int what;
+    for (what = 0; what < 5; what++) {
+        stage s = room(SPHERES);
+        pt_render_desc d;
+        pt_film film;
+        int k;
+        if (what == 0) add_ball(&s.scene, &HERE, 0, 0.4, 0, 0.0025, 0); /* 2048 e = 0.0021 */
+        while (what == 1 && s.scene.sphere_count + s.scene.parallelogram_count + s.scene.triangle_count < 64) {
+            k = (int)s.scene.sphere_count;
+            add_ball(&s.scene, &HERE, -0.9 + 0.2 * (k % 8), -0.9, -0.9 + 0.2 * (k / 8), 0.05, 0);
+        }
+        commit(&s);
+        d = desc_of(&s, 12, 9, 2);
+        if (what == 2) d.camera = pt_camera_look_at(v3(0, 0, 1000), v3(0, 0, 0), v3(0, 1, 0), (pt_real)0.1);
+        if (what == 3) d.li.max_edges = (1 << 24) - 1;
+        if (what == 4) d.sampler = PT_SAMPLER_INDEPENDENT;
+        film = render(&s, &d, 1, NULL);
+        if (pt_test.is_verbose) printf("       taken, way %d\n", what);
+        pt_film_free(&film);
+        pt_scene_free(&s.scene);
+    }
+}
+
 #endif /* PTI_HAS_LOCKSTEP */
+
+/* Of test_together.c, what the variants need. */
+static inline void two_rooms(void)
+{
+    static const int kinds[2] = {GLASS_BOX, MANY_LAMPS};
+    int i;
+    pt_test_source("pti_path");
+    for (i = 0; i < 2; i++) {
+        stage s = room(kinds[i]);
+        const pt_render_desc d = desc_of(&s, 9, 6, samples(48));
+        const picture a = pictures(&s, d, RENDERS, 800000u + 1000u * (uint64_t)i, 1), b = pictures(&s, d, RENDERS, 800500u + 1000u * (uint64_t)i, 0);
+        compare(room_names[kinds[i]], &a, &b, within(0.05));
+        pt_scene_free(&s.scene);
+    }
+}
 
 static int lockstep(int argc, char **argv)
 {
     pt_test_begin(LOCK_PROGRAM, argc, argv);
 #if PTI_HAS_LOCKSTEP
     printf("lanes: %d, %s\n", PTI_WIDTH, PTI_WIDTH == 16 ? "AVX-512" : PTI_LANES == 2 ? "AVX2" : PTI_LANES == 1 ? "SSE2" : "C");
+#ifdef LOCK_WIDTH
+    pt_check(PTI_WIDTH == LOCK_WIDTH && PTI_LANES == LOCK_LANES, "lanes", "%d, and lanes of 8 of kind %d: not what this program is for", PTI_WIDTH, PTI_LANES);
+#endif
     PT_TEST_EXACT(no_way_out);
-    PT_TEST(furnaces);
-    PT_TEST(irradiance);
+    if (WHOLE) {
+        PT_TEST(furnaces);
+        PT_TEST(irradiance);
+        PT_TEST_EXACT(passes);
+        PT_TEST_EXACT(endless);
+        PT_TEST_EXACT(cancelled);
+        PT_TEST_EXACT(refused);
+        PT_TEST_EXACT(taken);
+    } else {
+        PT_TEST(two_rooms);
+    }
     PT_TEST_EXACT(same_bits);
-    PT_TEST_EXACT(passes);
-    PT_TEST_EXACT(endless);
-    PT_TEST_EXACT(cancelled);
+    PT_TEST_EXACT(not_caught);
+    PT_TEST_EXACT(words);
+    PT_TEST_EXACT(floats);
+    PT_TEST_EXACT(angles);
+    PT_TEST_EXACT(sobol_points);
+    PT_TEST_EXACT(sampler_numbers);
+    PT_TEST_EXACT(generator);
+    PT_TEST(numbers_of_paths);
+    PT_TEST(cosines);
+    PT_TEST(lights);
+    PT_TEST_EXACT(choice);
+    PT_TEST_EXACT(hits);
+    PT_TEST_EXACT(shadows);
 #endif
     return pt_test_end();
 }
