@@ -10301,16 +10301,29 @@ enum { PTI_LOCK_SLOTS = 2048, PTI_LOCK_QUEUE = 64 };
 typedef struct pti_lock_work {
     const pti_lockstep *k;
     const pt_li_options *options;
-    int technique, queued, cancelled;
+    int technique, queued, cancelled, describes; /* describes: `seen` is wanted                            */
     unsigned alive;                 /* lanes that hold a path                                              */
     uint64_t rays;
+    unsigned hit;                   /* lanes whose first edge met something, and what that is: albedo,     */
+    pti_lane_row seen[7];           /*   normal, distance                                                  */
     pti_lane_row row[PTI_ROWS];
     uint32_t queue[PTI_LOCK_QUEUE][PTI_ROWS]; /* paths that wait for a lane                                */
     double slots[PTI_LOCK_SLOTS][3]; /* what each path has found                                           */
 } pti_lock_work;
 
+/* What the first surface is, for the auxiliary pictures: as pti_describe_first_hit. */
+static void pti_lock_describe(pti_lock_work *w, const pti_lock_surface *s, const pti_lock_best *best)
+{
+    const pti_fw one = pti_fw_set(1), side = pti_fw_select(s->front, one, pti_fw_set(-1));
+    const pti_w3 grey = pti_w3_make(one, one, one), albedo = pti_gather3(w->k->of, PTI_OF_ALBEDO, s->i);
+    w->hit = pti_mw_bits(s->met);
+    pti_row3_set(w->seen, pti_w3_select(pti_lock_is(s, PT_MATERIAL_DIELECTRIC), grey, albedo));
+    pti_row3_set(w->seen + 3, pti_w3_scale(s->n, side));
+    w->seen[6].f = best->t;
+}
+
 /* The next edge of the paths in `row`, where `active`, as in pti_path; the lanes that go on. */
-static unsigned pti_lock_vertex(pti_lock_work *w, pti_lane_row *row, unsigned active, const pti_lock_numbers *u, pti_fw u_roulette, float e)
+static unsigned pti_lock_vertex(pti_lock_work *w, pti_lane_row *row, unsigned active, const pti_lock_numbers *u, pti_fw u_roulette, int first)
 {
     const pti_lockstep *k = w->k;
     const pt_li_options *options = w->options;
@@ -10321,10 +10334,11 @@ static unsigned pti_lock_vertex(pti_lock_work *w, pti_lane_row *row, unsigned ac
     pti_w3 weight, beta, next;
     pti_fw cosine, density;
     pti_mw go;
-    pti_lock_nearest(k, o, d, e, &best);
+    pti_lock_nearest(k, o, d, first ? k->e_camera : k->e, &best);
     w->rays += (uint64_t)pti_count_bits(active);
     s.met = pti_mw_and(pti_mw_of_bits(active), pti_fw_lt(best.t, pti_fw_set(PTI_LOCK_FAR)));
     pti_lock_land(k, o, d, &best, &s);
+    if (first && w->describes) pti_lock_describe(w, &s, &best);
     pti_lock_emission(k, &s, &best, row, w->technique, options->heuristic);
     go = s.met;
     if (options->max_edges > 0) go = pti_mw_and(go, pti_fw_lt(pti_fw_from_words(row[PTI_ROW_EDGES].u), pti_fw_set((float)options->max_edges)));
@@ -10399,7 +10413,7 @@ static void pti_lock_walk(pti_lock_work *w, int rest)
         roulette = pti_lock_next(&a, &b);
         row[PTI_ROW_A].u = a;
         row[PTI_ROW_B].u = b;
-        on = pti_lock_vertex(w, row, w->alive, &u, roulette, w->k->e);
+        on = pti_lock_vertex(w, row, w->alive, &u, roulette, 0);
         full = w->alive & pti_mw_bits(pti_fw_lt(pti_fw_from_words(pti_uw_and(row[PTI_ROW_EDGES].u, pti_uw_set(63))), pti_fw_set(1)));
         pti_lock_flush(w, row, (w->alive & ~on) | full);
         w->alive &= on;
@@ -10424,7 +10438,7 @@ static void pti_lock_start(pti_lock_work *w, pti_lane_row *row, unsigned active,
     row[PTI_ROW_DENSITY].f = pti_fw_set(-1);
     row[PTI_ROW_ETA2].f = one;
     row[PTI_ROW_EDGES].u = pti_uw_set(1);
-    on = pti_lock_vertex(w, row, active, u, roulette, w->k->e_camera);
+    on = pti_lock_vertex(w, row, active, u, roulette, 1);
     pti_lock_flush(w, row, active & ~on);
     for (on &= active; on; on &= on - 1) {
         const int i = pti_lowest_bit(on);
@@ -12888,7 +12902,7 @@ static int pti_pick_lockstep(const pt_method *method, const pt_scene *scene, con
 #if PTI_HAS_LPE
     if (d->li.lpe) return 0;
 #endif
-    if (d->no_lockstep || d->general_body || d->aov || d->sampler == PT_SAMPLER_STRATIFIED) return 0;
+    if (d->no_lockstep || d->general_body || d->sampler == PT_SAMPLER_STRATIFIED) return 0;
     if (d->li.max_edges >= 1 << 24 || d->li.roulette_start >= 1 << 24) return 0; /* they are counted in floats */
     return pti_lockstep_make(out, scene, pt_v3(pti_fabs(c->position.x) + ahead, pti_fabs(c->position.y) + ahead, pti_fabs(c->position.z) + ahead));
 }
@@ -13332,11 +13346,22 @@ PTI_INLINE void pti_lock_advance(const pti_pass *p, const int box[4], pti_lock_c
     at->y++;
 }
 
+/* Adds what the first edge of lane i met. */
+static void pti_lock_add_seen(pt_film *film, const pti_lock_work *w, int i, const pti_lock_cursor *at, int width)
+{
+    const size_t pixel = (size_t)at->y * (size_t)width + (size_t)at->x;
+    const pti_lane_row *s = w->seen;
+    if (!(w->hit >> i & 1)) return;
+    pti_add3(film->albedo + 3 * pixel, (double)s[0].v[i], (double)s[1].v[i], (double)s[2].v[i]);
+    pti_add3(film->normal + 3 * pixel, (double)s[3].v[i], (double)s[4].v[i], (double)s[5].v[i]);
+    film->depth[pixel] += (double)s[6].v[i];
+}
+
 /* The next `count` paths of a tile, each in its slot, added to the film in order. */
 static void pti_lock_run(pti_pass *p, pti_lock_work *w, pt_sampler *sampler, const int box[4], pti_lock_cursor *at, uint32_t count)
 {
     const pt_render_desc *d = p->desc;
-    pti_lock_cursor from = *at;
+    pti_lock_cursor from = *at, seen = *at;
     pti_lock_seeds seeds[2];
     pti_lock_batch batch;
     pti_lane_row row[PTI_ROWS], film[4];
@@ -13360,6 +13385,7 @@ static void pti_lock_run(pti_pass *p, pti_lock_work *w, pt_sampler *sampler, con
         pti_lock_draw(w, &batch, row, d->sampler == PT_SAMPLER_SOBOL, d->camera.lens_radius > 0, film, &u);
         pti_lock_camera(d, &batch, film, row, (int)lanes);
         pti_lock_start(w, row, ~0u >> (32 - lanes), &u);
+        for (i = 0; i < lanes && w->describes; i++, pti_lock_advance(p, box, &seen)) pti_lock_add_seen(p->film, w, (int)i, &seen, d->width);
     }
     pti_lock_walk(w, 0);
     for (j = 0; j < count && !w->cancelled; j++, pti_lock_advance(p, box, &from)) {
@@ -13381,6 +13407,7 @@ static void pti_lock_tile(pti_pass *p, const int box[4], pt_sampler *sampler)
     w.options = &p->options;
     w.technique = p->technique;
     w.queued = w.cancelled = 0;
+    w.describes = p->film->albedo != NULL;
     w.alive = 0;
     memset(w.row, 0, sizeof w.row);
     at.x = box[0];
