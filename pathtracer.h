@@ -55,8 +55,7 @@
        [PT-05] radiometry: solid angles, irradiance, spectra
        [PT-06] shapes and rays: intersection, error bounds, where the next ray starts
        [PT-07] bounding volume hierarchy
-       [PT-07b] the wide tree: eight boxes or triangles at a time
-       [PT-07c] small scenes: eight planes or spheres at a time, without a tree
+       [PT-07b] the wide tree, and small scenes without a tree: eight boxes, triangles or spheres at a time
        [PT-08] materials (BSDFs)
        [PT-09] lights
        [PT-10] scene, camera, film
