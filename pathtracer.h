@@ -2414,10 +2414,11 @@ PTI_INLINE pti_f8 pti_f8_select(pti_m8 m, pti_f8 x, pti_f8 y)
 }
 PTI_INLINE unsigned pti_m8_bits(pti_m8 m)
 {
-    unsigned bits = 0;
+    static const int32_t bit[8] = {1, 2, 4, 8, 16, 32, 64, 128};
+    int32_t bits = 0;
     int i;
-    for (i = 0; i < 8; i++) bits |= (unsigned)m.v[i] & 1u << i;
-    return bits;
+    for (i = 0; i < 8; i++) bits += m.v[i] & bit[i]; /* a sum that compilers know how to do four at a time */
+    return (unsigned)bits;
 }
 #endif
 
@@ -5348,14 +5349,16 @@ PTI_INLINE unsigned pti_triangle_lanes(const pti_triangle8 *p, const pti_ray *r,
     const pti_f8 zero = pti_f8_set(0), one_side = pti_f8_max(pti_f8_add(e.low, e.error), pti_f8_sub(e.error, e.high));
     unsigned lanes = pti_m8_bits(pti_f8_le(zero, one_side));
     if (lanes) {
-        const float flat = fabsf(w->d[r->kz]);
+        const float flat = fabsf(w->d[r->kz]), end = limit * flat < 2 * w->span ? limit * flat : 2 * w->span;
         pti_f8 det, off;
         const pti_f8 depth = pti_depth_lanes(&e, r, w, &det, &off);
-        lanes &= pti_m8_bits(pti_f8_le(pti_f8_sub(depth, off), pti_f8_mul(det, pti_f8_set(limit * flat < 2 * w->span ? limit * flat : 2 * w->span)))) & pti_m8_bits(pti_f8_le(zero, pti_f8_add(depth, off)));
+        const pti_f8 before = pti_f8_sub(pti_f8_madd(det, pti_f8_set(end), off), depth);
+        lanes &= pti_m8_bits(pti_f8_le(zero, pti_f8_min(before, pti_f8_add(depth, off))));
         if (sure) {
-            const pti_f8 clear = pti_f8_min(depth, pti_f8_sub(pti_f8_mul(det, pti_f8_set(pti_ray8_before(limit) * flat)), depth));
-            *sure = pti_m8_bits(pti_f8_lt(e.error, pti_f8_max(e.low, pti_f8_sub(zero, e.high)))) &
-                    pti_m8_bits(pti_f8_lt(pti_f8_add(off, off), clear));
+            const pti_f8 last = pti_f8_mul(det, pti_f8_set(pti_ray8_before(limit) * flat)); /* det 0: may be NaN, not sure */
+            const pti_f8 clear = pti_f8_sub(pti_f8_min(depth, pti_f8_sub(last, depth)), pti_f8_add(off, off));
+            const pti_f8 inside = pti_f8_sub(pti_f8_max(e.low, pti_f8_sub(zero, e.high)), e.error);
+            *sure = pti_m8_bits(pti_f8_lt(zero, pti_f8_min(inside, clear)));
         }
     }
     return lanes;
