@@ -4797,7 +4797,7 @@ typedef struct pti_sphere8 {
 } pti_sphere8;
 
 /* BUILDING. First a binary tree as in [PT-07], by the surface area heuristic with bins; but eight triangles cost what one
-   does, so a side costs its area times ceil(n / 8), and eight are a leaf. Then, of all ways in which nodes of up to eight
+   does, so a side costs its area times ceil(n / 8), and eight are a leaf, but for large ones: walls are better off apart. Then, of all ways in which nodes of up to eight
    children can be cut from that tree, the one whose nodes and leaves have the least area together: with c(n, k) the
    least cost of subtree n in at most k slots of a parent [Yli17],
 
@@ -4809,6 +4809,7 @@ typedef struct pti_sphere8 {
 #define PTI_WIDE_BINS 16
 #define PTI_PIECES 256
 #define PTI_WIDE_DEPTH 32   /* deeper down lists are halved, and end within 28 levels                      */
+#define PTI_WALL 0.1f       /* a leaf of more than a 30th of the surface of a cube around the scene is cut where that pays */
 
 /* Some boxes joined, and {-least, greatest} of twice their centres. */
 typedef struct pti_joined {
@@ -4966,6 +4967,8 @@ static void pti_build_binary(pti_wide_builder *b, uint32_t n, const pti_joined *
 {
     pti_binary *node = &b->nodes[n];
     const uint32_t begin = node->first, end = begin + node->count;
+    const float area = pti_scaled_area(b, all->box.v);
+    const int mixed = n == 0 && b->flats > 0 && b->flats < end, few = node->count <= 8 && !mixed;
     pti_parting p = {-1, 0, 0, 0, HUGE_VALF, (node->count / 2 + 7) / 8 * 8};
     pti_joined side[2];
     uint32_t middle, k;
@@ -4974,20 +4977,16 @@ static void pti_build_binary(pti_wide_builder *b, uint32_t n, const pti_joined *
         node->hi[k] = all->box.v[4 + k];
     }
     node->child = 0;
-    for (k = 0; k < 7; k++) node->cost[k] = pti_scaled_area(b, all->box.v);
-    if (node->count <= 8 && (n > 0 || b->flats == 0 || b->flats >= end)) {
-        if (depth >= 8 || node->count < 2) return;
-        pti_find_parting(b, begin, end, all->centres.v, 1, &p);
-        if (!(p.cost < pti_scaled_area(b, all->box.v))) return;
-    }
-    if (pieces && n > 0 && node->count <= b->piece_size && b->piece_count < PTI_PIECES) {
+    for (k = 0; k < 7; k++) node->cost[k] = area;
+    if (few && (depth >= 8 || area < PTI_WALL)) return;
+    if (pieces && n > 0 && !few && node->count <= b->piece_size && b->piece_count < PTI_PIECES) {
         const pti_piece piece = {n, depth, *all};
         b->pieces[b->piece_count++] = piece;
         return;
     }
-    if (p.cost < HUGE_VALF) ;
-    else if (n == 0 && b->flats > 0 && b->flats < end) p.middle = b->flats;
+    if (mixed) p.middle = b->flats;
     else if (depth < PTI_WIDE_DEPTH) pti_find_parting(b, begin, end, all->centres.v, depth < 8 ? 1 : 4, &p);
+    if (few && !(p.cost < area)) return;
     middle = pti_part(b, begin, end, &p, side);
     node->child = (uint32_t)PTI_ADD(&b->next, 2);
     for (k = 0; k < 2; k++) {
