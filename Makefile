@@ -201,6 +201,7 @@ build/test/test_%: tests/test_%.c $(wildcard tests/*.h) pathtracer.h build/test/
 
 build/test/test_stress: tests/stress.c
 build/test/test_wide_plain build/test/test_wide_avx2: tests/test_wide.c
+build/test/test_lockstep_plain build/test/test_lockstep_avx2 build/test/test_lockstep_avx512: tests/test_lockstep.c
 
 build/test/test_%.log: build/test/test_% FORCE
 	@sh tests/run.sh one $@ ./$<

@@ -108,7 +108,7 @@ static void no_way_out(void)
     double edges = 0;
     int kind;
     for (kind = 0; kind < FURNACES; kind++) {
-        const uint32_t few = pt_test.is_short ? 1 : WHOLE ? 4 : 2, more = kind == THINGS ? 6 * few : few;
+        const uint32_t few = pt_test.is_short ? 1 : WHOLE ? 3 : 2, more = kind == THINGS ? 6 * few : few;
         if (kind != THIN_WEDGE) edges += walk_to_the_end(kind, 0.999, 500, 2 * more);
         if (WHOLE || kind == WEDGE) edges += walk_to_the_end(kind, 0.9, 10, kind == THIN_WEDGE ? 2 : 8 * few);
     }
@@ -228,8 +228,6 @@ static void same_bits(void)
         if (r == 2) d.single_net = 1;
         if (r == 2) d.camera.lens_radius = (pt_real)0.02;
         first = render(&s, &d, 1, &rays);
-        for (i = 0, k = 0; i < 37 * 19; i++) k += memcmp(first.half[0] + 3 * i, first.half[1] + 3 * i, 3 * sizeof(double)) == 0;
-        pt_check(k < 37 * 19 / 2, room_names[kinds[r]], "%d of %d pixels are the same in both halves", k, 37 * 19);
         for (i = 0; i < 3; i++)
             for (k = 0; k < 4; k++) {
                 const char *name = label("%s, %d threads, tiles of %d", room_names[kinds[r]], threads[i], tile[k]);
@@ -291,6 +289,29 @@ static void passes(void)
             pt_film_free(&whole);
             pt_scene_free(&s.scene);
         }
+}
+
+/* One sample in each half: other random numbers, and about the same light. */
+static void halves(void)
+{
+    int kind, i, same = 0;
+    for (kind = PT_SAMPLER_SOBOL; kind <= PT_SAMPLER_INDEPENDENT; kind++) {
+        stage s = room(MANY_LAMPS);
+        pt_render_desc d = desc_of(&s, 30, 30, 2);
+        double sum[2] = {0, 0};
+        pt_film film;
+        d.sampler = (pt_sampler_kind)kind;
+        film = render(&s, &d, 1, NULL);
+        for (i = 0; i < 30 * 30; i++) {
+            sum[0] += film.half[0][3 * i];
+            sum[1] += film.half[1][3 * i];
+            same += memcmp(film.half[0] + 3 * i, film.half[1] + 3 * i, 3 * sizeof(double)) == 0;
+        }
+        pt_check(same < 300, pt_sampler_name(d.sampler), "%d of 900 pixels are the same in both halves", same);
+        pt_check(sum[0] > 0.5 * sum[1] && sum[1] > 0.5 * sum[0], pt_sampler_name(d.sampler), "%g in one half, %g in the other", sum[0], sum[1]);
+        pt_film_free(&film);
+        pt_scene_free(&s.scene);
+    }
 }
 
 static int stop_at_once(void *user) { return ++*(int *)user >= 1; }
@@ -367,37 +388,52 @@ static void cancelled(void)
 
 /* ---- time: no path is caught in glass -------------------------------------------------------------------------- */
 
-/* A ray that gets into glass at an angle that no refraction gives is reflected totally for ever. Edges of a box, seen from all
-   sides; a ball that touches the floor, seen at the contact; a ball that stands half in the floor. */
+/* Glass: a box in a room; a ball that touches a wide floor, seen in the gap there, and one that stands in it. */
+static stage glass_scene(int kind)
+{
+    const double y = kind == 1 ? 0.4 : 0.1;
+    stage s;
+    if (kind == 0) return room(GLASS_BOX);
+    memset(&s, 0, sizeof s);
+    pt_add_parallelogram(&s.scene, v3(-50, 0, -50), v3(0, 0, 100), v3(100, 0, 0), diffuse(&s.scene, 0.9, 0.9, 0.9));
+    add_ball(&s.scene, &HERE, 0, y, 0, 0.4, pt_add_material(&s.scene, pt_material_dielectric((pt_real)1.5)));
+    add_ball(&s.scene, &HERE, 0, 5, 0, 2, lamp(&s.scene, 1, 1, 1));
+    s.camera = kind == 1 ? camera_at(&HERE, 0, 0.02, 1, 0, 0, 0, 0.7) : camera_at(&HERE, 0, 0.3, 1, 0, 0, 0.38, 1);
+    commit(&s);
+    return s;
+}
+
+static double rays_a_path(const stage *s, int lockstep, int renders, uint32_t spp)
+{
+    double edges = 0;
+    int k;
+    for (k = 0; k < renders; k++) {
+        pt_render_desc d = desc_of(s, 9, 6, spp);
+        uint64_t rays;
+        pt_film film;
+        d.seed = 301000u + (uint64_t)k;
+        d.no_lockstep = !lockstep;
+        d.li.max_edges = 1 << 20;
+        d.li.roulette_scale = 4;
+        film = render(s, &d, lockstep, &rays);
+        edges += (double)rays;
+        pt_film_free(&film);
+    }
+    return edges / (54.0 * spp * renders);
+}
+
+/* A ray that gets into glass at an angle that no refraction gives is reflected totally for ever, or until it comes by where it
+   got in: then paths are longer than one at a time. */
 static void not_caught(void)
 {
-    static const char *const names[3] = {"glass and mirror box", "glass ball on the floor", "glass ball in the floor"};
-    int kind, k;
+    static const char *const names[3] = {"box of glass", "glass ball on the floor", "glass ball in the floor"};
+    int kind;
     for (kind = 0; kind < 3; kind++) {
-        stage s;
-        double edges = 0, paths = 0;
-        if (kind == 0) s = room(GLASS_BOX);
-        else {
-            memset(&s, 0, sizeof s);
-            add_walls(&s.scene, QUAD, &HERE);
-            add_lamp(&s.scene, &HERE, -0.5, 0.98, -0.6, 1, 0, lamp(&s.scene, 5, 5, 5));
-            add_ball(&s.scene, &HERE, 0, kind == 1 ? -0.6 : -1, -0.2, 0.4, pt_add_material(&s.scene, pt_material_dielectric((pt_real)1.5)));
-            s.camera = camera_at(&HERE, 0.5, kind == 1 ? -0.95 : -0.7, 0.5, kind == 1 ? 0 : 0.28, -1, kind == 1 ? -0.2 : 0.08, kind == 1 ? 0.4 : 1);
-            commit(&s);
-        }
-        for (k = 0; k < (kind == 0 ? 32 : 4); k++) {
-            pt_render_desc d = desc_of(&s, 9, 6, WHOLE && !pt_test.is_short ? 64 : 16);
-            uint64_t rays;
-            pt_film film;
-            d.seed = 301000u + (uint64_t)k;
-            d.li.max_edges = 100000;
-            film = render(&s, &d, 1, &rays);
-            edges += (double)rays;
-            paths += 9.0 * 6 * d.spp;
-            pt_film_free(&film);
-        }
-        pt_check(edges < 40 * paths, names[kind], "%.1f rays a path", edges / paths);
-        if (pt_test.is_verbose) printf("       %s: %.2f rays a path\n", names[kind], edges / paths);
+        const int few = pt_test.is_short || !WHOLE;
+        stage s = glass_scene(kind);
+        const double a = rays_a_path(&s, 1, few ? 16 : 32, kind == 0 || few ? 64 : 128), b = rays_a_path(&s, 0, 16, 32);
+        pt_check(fabs(a - b) < 0.08 * b, names[kind], "%.2f rays a path, one at a time %.2f", a, b);
+        if (pt_test.is_verbose) printf("       %s: %.2f rays a path, one at a time %.2f\n", names[kind], a, b);
         pt_scene_free(&s.scene);
     }
 }
@@ -1335,6 +1371,7 @@ static int lockstep(int argc, char **argv)
         PT_TEST(furnaces);
         PT_TEST(irradiance);
         PT_TEST_EXACT(passes);
+        PT_TEST_EXACT(halves);
         PT_TEST_EXACT(endless);
         PT_TEST_EXACT(cancelled);
         PT_TEST_EXACT(refused);
