@@ -397,6 +397,7 @@ static void general_body(void)
         pt_report report = PT_REPORT_INIT;
         pt_film film = PT_FILM_INIT, general;
         d.aov = 1;
+        d.no_lockstep = 1;
         pt_check(pt_render(&s.scene, &d, &film, &report) == PT_OK, scenes[i].name, "cannot be rendered");
         special += strcmp(report.body, "general") != 0;
         d.general_body = 1;
