@@ -46,7 +46,7 @@ FROM = 1
 SEEDS = 100
 TO = $(shell echo $$(($(FROM) + $(SEEDS) - 1)))
 
-.PHONY: all scenes lessons lesson-programs course exercises test test-long test-seeds test-table test-logs examples bench report book mutants stress fuzz clean help FORCE
+.PHONY: all scenes lessons lesson-programs course exercises test test-long test-seeds test-table test-logs examples bench bench-embree report book mutants stress fuzz clean help FORCE
 # A program that was built only half is no program.
 .DELETE_ON_ERROR:
 
@@ -66,6 +66,7 @@ help:
 	@echo 'make exercises  build each lesson with each of its exercises, -DEX=1 and on, and run it; N=07 tries one'
 	@echo 'make examples   build and run the programs of examples/'
 	@echo 'make bench      rays per second, compile time, what leaving out saves; CSV on stdout'
+	@echo 'make bench-embree rays and tree against Embree 3 where it is installed; CSV on stdout; MESHES=room-118k'
 	@echo 'make report     error against run time of all scenes and methods: build/report/index.html; SCENE METHOD SECONDS=60'
 	@echo 'make book       the course as one page: build/book/index.html'
 	@echo 'make mutants    break the header, one change at a time; every broken copy must fail a check; GENERATED=n ALL=1'
@@ -230,6 +231,19 @@ book:
 
 bench: build/bench
 	@CC='$(CC)' CFLAGS='$(CFLAGS)' build/bench
+
+# Only where Embree 3 is installed (Debian: libembree-dev). One build for the machine, one as everything is built, one in plain C.
+# MESHES=room-118k takes one; tests/bench/embree.c names them.
+bench-embree: tests/bench/embree.c pathtracer.h
+	@mkdir -p build
+	@if ! echo '#include <embree3/rtcore.h>' | $(CC) -E - > /dev/null 2>&1; then \
+	    echo 'skipped: Embree 3 is not installed'; exit 0; fi; \
+	echo 'name,value,unit,reference,ratio,low,high'; \
+	for lanes in native default plain; do \
+	    case $$lanes in native) flags=-march=native ;; default) flags= ;; plain) flags=-DPT_NO_INTRINSICS ;; esac; \
+	    $(CC) -std=gnu99 -ffp-contract=off $(CFLAGS) $(EXTRA) $$flags -I. -pthread tests/bench/embree.c -o build/embree-$$lanes \
+	        $(LDFLAGS) -lembree3 $(LDLIBS) && build/embree-$$lanes $(MESHES) || exit 1; \
+	done
 
 # 1: all of them; n: every n-th, JOBS of n * JOBS shares.
 SLICES = 1

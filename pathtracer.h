@@ -78,7 +78,7 @@
        PT_NO_FILES         no files: pictures, films, tables; implies PT_NO_OBJ
        PT_NO_OBJ           no models from OBJ files
        PT_NO_BVH           linear search instead of a tree; implies that there is no wide one
-       PT_NO_SIMD          no lanes: the binary tree, which is 3 to 5 times slower, and paths one at a time
+       PT_NO_SIMD          no lanes: the binary tree, which is 1.5 to 4 times slower, and paths one at a time
        PT_NO_INTRINSICS    lanes in plain C, also where the compiler aims at SSE2 or AVX2 (-mavx2 -mfma, -march=native)
        PT_NO_ENVIRONMENT   no light from the background
        PT_NO_MICROFACET    no rough metal and glass, no smooth metal, no Oren-Nayar
@@ -1239,7 +1239,7 @@ enum {
 typedef struct pt_scene {
     void *alloc_user;
     /* how pt_commit works */
-    pt_tree tree;
+    pt_tree tree;            /* which tree rays walk                                                       */
     int threads;             /* 0 = as many as the machine has                                             */
     pt_parallel_fn parallel; /* NULL = own threads                                                         */
     void *parallel_user;
@@ -2423,10 +2423,11 @@ PTI_INLINE pti_f8 pti_f8_select(pti_m8 m, pti_f8 x, pti_f8 y)
 }
 PTI_INLINE unsigned pti_m8_bits(pti_m8 m)
 {
-    unsigned bits = 0;
+    static const int32_t bit[8] = {1, 2, 4, 8, 16, 32, 64, 128};
+    int32_t bits = 0;
     int i;
-    for (i = 0; i < 8; i++) bits |= (unsigned)m.v[i] & 1u << i;
-    return bits;
+    for (i = 0; i < 8; i++) bits += m.v[i] & bit[i]; /* a sum that compilers know how to do four at a time */
+    return (unsigned)bits;
 }
 #endif
 
@@ -4758,8 +4759,8 @@ static int pti_traverse(const pt_scene *scene, const pti_ray *r, pti_best *best,
 /* =====================================================================================================
    [PT-07b] WIDE TREE: implementation
    =====================================================================================================
-   Optional, and nobody needs it to understand anything: the answers of the tree of [PT-07], bit for bit, four times as
-   fast. Eight boxes or triangles are tested at a time, one in each lane ([PT-01]).
+   Optional, and nobody needs it to understand anything: the answers of the tree of [PT-07], bit for bit, two to
+   four times as fast (make bench-embree compares it with Embree). Eight boxes or triangles are tested at a time, one in each lane ([PT-01]).
 
    Lanes are float, and float cannot decide: [PT-06] decides in double, exactly. So a lane only asks whether a primitive
    MAY be hit. It computes in float what [PT-06] computes in double, and a bound of the difference, and says no where
@@ -4807,7 +4808,7 @@ typedef struct pti_sphere8 {
 } pti_sphere8;
 
 /* BUILDING. First a binary tree as in [PT-07], by the surface area heuristic with bins; but eight triangles cost what one
-   does, so a side costs its area times ceil(n / 8), and eight are a leaf. Then, of all ways in which nodes of up to eight
+   does, so a side costs its area times ceil(n / 8), and eight are a leaf, but for large ones: walls are better off apart. Then, of all ways in which nodes of up to eight
    children can be cut from that tree, the one whose nodes and leaves have the least area together: with c(n, k) the
    least cost of subtree n in at most k slots of a parent [Yli17],
 
@@ -4819,6 +4820,7 @@ typedef struct pti_sphere8 {
 #define PTI_WIDE_BINS 16
 #define PTI_PIECES 256
 #define PTI_WIDE_DEPTH 32   /* deeper down lists are halved, and end within 28 levels                      */
+#define PTI_WALL 0.1f       /* a leaf of more than a 30th of the surface of a cube around the scene is cut where that pays */
 
 /* Some boxes joined, and {-least, greatest} of twice their centres. */
 typedef struct pti_joined {
@@ -4976,6 +4978,8 @@ static void pti_build_binary(pti_wide_builder *b, uint32_t n, const pti_joined *
 {
     pti_binary *node = &b->nodes[n];
     const uint32_t begin = node->first, end = begin + node->count;
+    const float area = pti_scaled_area(b, all->box.v);
+    const int mixed = n == 0 && b->flats > 0 && b->flats < end, few = node->count <= 8 && !mixed;
     pti_parting p = {-1, 0, 0, 0, HUGE_VALF, (node->count / 2 + 7) / 8 * 8};
     pti_joined side[2];
     uint32_t middle, k;
@@ -4984,20 +4988,16 @@ static void pti_build_binary(pti_wide_builder *b, uint32_t n, const pti_joined *
         node->hi[k] = all->box.v[4 + k];
     }
     node->child = 0;
-    for (k = 0; k < 7; k++) node->cost[k] = pti_scaled_area(b, all->box.v);
-    if (node->count <= 8 && (n > 0 || b->flats == 0 || b->flats >= end)) {
-        if (depth >= 8 || node->count < 2) return;
-        pti_find_parting(b, begin, end, all->centres.v, 1, &p);
-        if (!(p.cost < pti_scaled_area(b, all->box.v))) return;
-    }
-    if (pieces && n > 0 && node->count <= b->piece_size && b->piece_count < PTI_PIECES) {
+    for (k = 0; k < 7; k++) node->cost[k] = area;
+    if (few && (depth >= 8 || area < PTI_WALL)) return;
+    if (pieces && n > 0 && !few && node->count <= b->piece_size && b->piece_count < PTI_PIECES) {
         const pti_piece piece = {n, depth, *all};
         b->pieces[b->piece_count++] = piece;
         return;
     }
-    if (p.cost < HUGE_VALF) ;
-    else if (n == 0 && b->flats > 0 && b->flats < end) p.middle = b->flats;
+    if (mixed) p.middle = b->flats;
     else if (depth < PTI_WIDE_DEPTH) pti_find_parting(b, begin, end, all->centres.v, depth < 8 ? 1 : 4, &p);
+    if (few && !(p.cost < area)) return;
     middle = pti_part(b, begin, end, &p, side);
     node->child = (uint32_t)PTI_ADD(&b->next, 2);
     for (k = 0; k < 2; k++) {
@@ -5359,14 +5359,16 @@ PTI_INLINE unsigned pti_triangle_lanes(const pti_triangle8 *p, const pti_ray *r,
     const pti_f8 zero = pti_f8_set(0), one_side = pti_f8_max(pti_f8_add(e.low, e.error), pti_f8_sub(e.error, e.high));
     unsigned lanes = pti_m8_bits(pti_f8_le(zero, one_side));
     if (lanes) {
-        const float flat = fabsf(w->d[r->kz]);
+        const float flat = fabsf(w->d[r->kz]), end = limit * flat < 2 * w->span ? limit * flat : 2 * w->span;
         pti_f8 det, off;
         const pti_f8 depth = pti_depth_lanes(&e, r, w, &det, &off);
-        lanes &= pti_m8_bits(pti_f8_le(pti_f8_sub(depth, off), pti_f8_mul(det, pti_f8_set(limit * flat < 2 * w->span ? limit * flat : 2 * w->span)))) & pti_m8_bits(pti_f8_le(zero, pti_f8_add(depth, off)));
+        const pti_f8 before = pti_f8_sub(pti_f8_madd(det, pti_f8_set(end), off), depth);
+        lanes &= pti_m8_bits(pti_f8_le(zero, pti_f8_min(before, pti_f8_add(depth, off))));
         if (sure) {
-            const pti_f8 clear = pti_f8_min(depth, pti_f8_sub(pti_f8_mul(det, pti_f8_set(pti_ray8_before(limit) * flat)), depth));
-            *sure = pti_m8_bits(pti_f8_lt(e.error, pti_f8_max(e.low, pti_f8_sub(zero, e.high)))) &
-                    pti_m8_bits(pti_f8_lt(pti_f8_add(off, off), clear));
+            const pti_f8 last = pti_f8_mul(det, pti_f8_set(pti_ray8_before(limit) * flat)); /* det 0: may be NaN, not sure */
+            const pti_f8 clear = pti_f8_sub(pti_f8_min(depth, pti_f8_sub(last, depth)), pti_f8_add(off, off));
+            const pti_f8 inside = pti_f8_sub(pti_f8_max(e.low, pti_f8_sub(zero, e.high)), e.error);
+            *sure = pti_m8_bits(pti_f8_lt(zero, pti_f8_min(inside, clear)));
         }
     }
     return lanes;
@@ -9397,6 +9399,14 @@ PTI_INLINE pti_mw pti_mw_of_bits(unsigned bits)
 #endif
 #endif
 
+/* Kernels are one piece of code where lanes are registers. Arrays of eight floats, a register too many for compilers that see a
+   thousand of them at once, are better off in functions. */
+#if PTI_LANES > 0
+#define PTI_LOCK_INLINE PTI_INLINE
+#else
+#define PTI_LOCK_INLINE static
+#endif
+
 /* Operations on words; n: how far a shift goes. */
 #if PTI_WIDTH == 16
 #define PTI_UW(name, wide, avx, sse, plain) \
@@ -9536,7 +9546,7 @@ PTI_INLINE pti_w3 pti_w3_set(const float v[3]) { return pti_w3_make(pti_fw_set(v
 PTI_INLINE pti_w3 pti_w3_normalize(pti_w3 a) { return pti_w3_scale(a, pti_fw_div(pti_fw_set(1), pti_fw_sqrt(pti_w3_dot(a, a)))); }
 
 /* sin and cos of x in [-pi/4, pi/4], by their series: off by less than 2^-24 and 2^-23. */
-PTI_INLINE void pti_fw_sincos(pti_fw x, pti_fw *s, pti_fw *c)
+PTI_LOCK_INLINE void pti_fw_sincos(pti_fw x, pti_fw *s, pti_fw *c)
 {
     const pti_fw q = pti_fw_mul(x, x);
     pti_fw p = pti_fw_madd(q, pti_fw_set(1 / 362880.f), pti_fw_set(-1 / 5040.f));
@@ -9832,7 +9842,7 @@ typedef struct pti_lock_best {
 enum { PTI_LOCK_NEAREST, PTI_LOCK_ANY, PTI_LOCK_CAREFUL };
 
 /* A primitive that is met at t, `margin` inside its edges; slack > 0 from its front. */
-PTI_INLINE pti_mw pti_lock_keep(pti_lock_best *best, pti_fw t, pti_fw margin, pti_fw slack, int i, const int how)
+PTI_LOCK_INLINE pti_mw pti_lock_keep(pti_lock_best *best, pti_fw t, pti_fw margin, pti_fw slack, int i, const int how)
 {
     const pti_fw zero = pti_fw_set(0);
     pti_mw met = pti_mw_and(pti_fw_lt(zero, t), pti_fw_le(zero, pti_fw_add(margin, pti_fw_abs(slack))));
@@ -9851,7 +9861,7 @@ PTI_INLINE pti_mw pti_lock_keep(pti_lock_best *best, pti_fw t, pti_fw margin, pt
 }
 
 /* Rectangles across axis `kind`, whose coordinates are o.x, d.x after a turn of the axes. */
-PTI_INLINE pti_mw pti_lock_rectangles(const pti_lockstep *k, int kind, pti_w3 o, pti_w3 d, float e, pti_lock_best *best, pti_mw met, const int how)
+PTI_LOCK_INLINE pti_mw pti_lock_rectangles(const pti_lockstep *k, int kind, pti_w3 o, pti_w3 d, float e, pti_lock_best *best, pti_mw met, const int how)
 {
     const pti_fw inverse = pti_fw_div(pti_fw_set(1), d.x), slack = pti_fw_mul(inverse, pti_fw_set(-2 * e));
     const int end = how == PTI_LOCK_ANY ? k->blockers[kind] : k->begin[kind + 1];
@@ -9868,12 +9878,12 @@ PTI_INLINE pti_mw pti_lock_rectangles(const pti_lockstep *k, int kind, pti_w3 o,
     return met;
 }
 
-PTI_INLINE pti_fw pti_lock_height(const float *row, pti_w3 p)
+PTI_LOCK_INLINE pti_fw pti_lock_height(const float *row, pti_w3 p)
 {
     return pti_w3_dot_add(pti_w3_set(row), p, pti_fw_set(row[3]));
 }
 
-PTI_INLINE pti_mw pti_lock_flats(const pti_lockstep *k, int kind, pti_w3 o, pti_w3 d, float e, pti_lock_best *best, pti_mw met, const int how)
+PTI_LOCK_INLINE pti_mw pti_lock_flats(const pti_lockstep *k, int kind, pti_w3 o, pti_w3 d, float e, pti_lock_best *best, pti_mw met, const int how)
 {
     const int end = how == PTI_LOCK_ANY ? k->blockers[kind] : k->begin[kind + 1];
     int i;
@@ -9895,7 +9905,7 @@ PTI_INLINE pti_mw pti_lock_flats(const pti_lockstep *k, int kind, pti_w3 o, pti_
 
 /* As pti_sphere does it, for d of length 1. A ray that starts less than 5 e inside comes from something that touches the
    ball, and does not see it. */
-PTI_INLINE pti_mw pti_lock_balls(const pti_lockstep *k, pti_w3 o, pti_w3 d, pti_lock_best *best, pti_mw met, const int how)
+PTI_LOCK_INLINE pti_mw pti_lock_balls(const pti_lockstep *k, pti_w3 o, pti_w3 d, pti_lock_best *best, pti_mw met, const int how)
 {
     const pti_fw zero = pti_fw_set(0);
     int i;
@@ -9916,7 +9926,7 @@ PTI_INLINE pti_mw pti_lock_balls(const pti_lockstep *k, pti_w3 o, pti_w3 d, pti_
 }
 
 /* All primitives against a ray in each lane, d of length 1. PTI_LOCK_ANY: those that can block. */
-PTI_INLINE pti_mw pti_lock_ask(const pti_lockstep *k, pti_w3 o, pti_w3 d, float e, pti_lock_best *best, const int how)
+PTI_LOCK_INLINE pti_mw pti_lock_ask(const pti_lockstep *k, pti_w3 o, pti_w3 d, float e, pti_lock_best *best, const int how)
 {
     pti_mw met = pti_mw_of_bits(0);
     if (k->begin[1] > k->begin[0]) met = pti_lock_rectangles(k, 0, o, d, e, best, met, how);
@@ -9943,7 +9953,7 @@ static void pti_lock_nearest(const pti_lockstep *k, pti_w3 o, pti_w3 d, float e,
 /* --- numbers --- */
 
 /* xoroshiro64* [Bla21]: a + b -> 24 bits of each lane as a float in [0,1). */
-PTI_INLINE pti_fw pti_lock_next(pti_uw *a, pti_uw *b)
+PTI_LOCK_INLINE pti_fw pti_lock_next(pti_uw *a, pti_uw *b)
 {
     const pti_uw r = pti_uw_mul(*a, pti_uw_set(0x9e3779bbu)), x = pti_uw_xor(*a, *b);
     *a = pti_uw_xor(pti_uw_xor(pti_uw_or(pti_uw_shl(*a, 26), pti_uw_shr(*a, 6)), x), pti_uw_shl(x, 9));
@@ -9966,7 +9976,7 @@ PTI_INLINE pti_uw pti_lock_reverse(pti_uw x)
 }
 
 /* pti_laine_karras and pti_sobol_reversed in lanes. */
-PTI_INLINE pti_uw pti_lock_scramble(pti_uw x, pti_uw seed)
+PTI_LOCK_INLINE pti_uw pti_lock_scramble(pti_uw x, pti_uw seed)
 {
     x = pti_uw_xor(x, pti_uw_mul(x, pti_uw_set(0x3d20adeau)));
     x = pti_uw_add(x, seed);
@@ -10027,7 +10037,7 @@ PTI_INLINE pti_w3 pti_gather3(const float (*table)[PTI_LOCK_MAX], int row, pti_u
 }
 
 /* The point at t, put back on its surface and away from its edges. */
-PTI_INLINE void pti_lock_land(const pti_lockstep *k, pti_w3 o, pti_w3 d, const pti_lock_best *best, pti_lock_surface *s)
+PTI_LOCK_INLINE void pti_lock_land(const pti_lockstep *k, pti_w3 o, pti_w3 d, const pti_lock_best *best, pti_lock_surface *s)
 {
     const pti_fw zero = pti_fw_set(0), inset = pti_fw_set(16 * k->e);
     pti_w3 n;
@@ -10061,7 +10071,7 @@ PTI_INLINE pti_mw pti_lock_is(const pti_lock_surface *s, pt_material_kind kind)
 }
 
 /* pt_mis_weight in lanes. */
-PTI_INLINE pti_fw pti_lock_weight(pti_fw p, pti_fw q, pt_heuristic heuristic)
+PTI_LOCK_INLINE pti_fw pti_lock_weight(pti_fw p, pti_fw q, pt_heuristic heuristic)
 {
     const pti_fw one = pti_fw_set(1), ratio = pti_fw_div(q, p);
     if (heuristic == PT_HEURISTIC_BALANCE) return pti_fw_div(one, pti_fw_add(one, ratio));
@@ -10071,7 +10081,7 @@ PTI_INLINE pti_fw pti_lock_weight(pti_fw p, pti_fw q, pt_heuristic heuristic)
 }
 
 /* 1 - cos of the cone under which spheres are seen from d2 away, squared; 2 where p is inside. */
-PTI_INLINE pti_fw pti_lock_cone(pti_fw radius, pti_fw d2)
+PTI_LOCK_INLINE pti_fw pti_lock_cone(pti_fw radius, pti_fw d2)
 {
     const pti_fw s2 = pti_fw_div(pti_fw_mul(radius, radius), d2), one = pti_fw_set(1);
     const pti_fw omc = pti_fw_div(s2, pti_fw_add(one, pti_fw_sqrt(pti_fw_max(pti_fw_set(0), pti_fw_sub(one, s2)))));
@@ -10079,7 +10089,7 @@ PTI_INLINE pti_fw pti_lock_cone(pti_fw radius, pti_fw d2)
 }
 
 /* Adds the emission of what is hit, weighted. */
-PTI_INLINE void pti_lock_emission(const pti_lockstep *k, const pti_lock_surface *s, const pti_lock_best *best, pti_lane_row *row,
+PTI_LOCK_INLINE void pti_lock_emission(const pti_lockstep *k, const pti_lock_surface *s, const pti_lock_best *best, pti_lane_row *row,
                                   int technique, pt_heuristic heuristic)
 {
     const pti_fw zero = pti_fw_set(0), one = pti_fw_set(1), q = row[PTI_ROW_DENSITY].f;
@@ -10108,7 +10118,7 @@ PTI_INLINE void pti_lock_emission(const pti_lockstep *k, const pti_lock_surface 
 }
 
 /* The two unit vectors that make a frame with n [Duf17]. */
-PTI_INLINE void pti_lock_frame(pti_w3 n, pti_w3 *s, pti_w3 *t)
+PTI_LOCK_INLINE void pti_lock_frame(pti_w3 n, pti_w3 *s, pti_w3 *t)
 {
     const pti_fw zero = pti_fw_set(0), one = pti_fw_set(1), sign = pti_fw_select(pti_fw_lt(n.z, zero), pti_fw_set(-1), one);
     const pti_fw a = pti_fw_div(pti_fw_set(-1), pti_fw_add(sign, n.z)), b = pti_fw_mul(pti_fw_mul(n.x, n.y), a);
@@ -10118,7 +10128,7 @@ PTI_INLINE void pti_lock_frame(pti_w3 n, pti_w3 *s, pti_w3 *t)
 }
 
 /* cos and sin of 2 pi u: twice the double angle of a quarter. */
-PTI_INLINE void pti_lock_turn(pti_fw u, pti_fw *c, pti_fw *s)
+PTI_LOCK_INLINE void pti_lock_turn(pti_fw u, pti_fw *c, pti_fw *s)
 {
     pti_fw x, y;
     int i;
@@ -10134,7 +10144,7 @@ PTI_INLINE void pti_lock_turn(pti_fw u, pti_fw *c, pti_fw *s)
 
 /* How far along s->n the next ray starts, if it goes to w: 2 e off the surface, 8 e inside balls. A point of a wall that touches
    a ball can start no more than 3 e inside it: so pti_lock_balls tells them apart. */
-PTI_INLINE pti_fw pti_lock_lift(const pti_lockstep *k, const pti_lock_surface *s, pti_w3 w)
+PTI_LOCK_INLINE pti_fw pti_lock_lift(const pti_lockstep *k, const pti_lock_surface *s, pti_w3 w)
 {
     const pti_fw zero = pti_fw_set(0), along = pti_w3_dot(s->n, w);
     const pti_fw out = pti_fw_select(s->front, along, pti_fw_sub(zero, along));
@@ -10154,7 +10164,7 @@ PTI_INLINE pti_w3 pti_lit3(const pti_lockstep *k, int row, pti_uw light)
 
 /* A point of spheres: in the cone seen from p, or, from inside, in any direction. *q: the point, moved 2 e off to the side
    of p; *to: the direction that was drawn, which from 2 e inside the sphere is not that of q; density per solid angle. */
-PTI_INLINE pti_fw pti_lock_ball_point(const pti_lockstep *k, pti_uw light, pti_w3 p, const pti_lock_numbers *u, pti_w3 *q, pti_w3 *to)
+PTI_LOCK_INLINE pti_fw pti_lock_ball_point(const pti_lockstep *k, pti_uw light, pti_w3 p, const pti_lock_numbers *u, pti_w3 *q, pti_w3 *to)
 {
     const pti_fw zero = pti_fw_set(0), one = pti_fw_set(1), r = pti_lit(k, PTI_LIT_RADIUS, light);
     const pti_w3 centre = pti_lit3(k, PTI_LIT_P, light), c = pti_w3_sub(centre, p);
@@ -10176,7 +10186,7 @@ PTI_INLINE pti_fw pti_lock_ball_point(const pti_lockstep *k, pti_uw light, pti_w
 }
 
 /* A point of a flat light, moved 2 e off its front; density per area. */
-PTI_INLINE pti_fw pti_lock_flat_point(const pti_lockstep *k, pti_uw light, const pti_lock_numbers *u, pti_w3 *q, pti_w3 *n)
+PTI_LOCK_INLINE pti_fw pti_lock_flat_point(const pti_lockstep *k, pti_uw light, const pti_lock_numbers *u, pti_w3 *q, pti_w3 *n)
 {
     const pti_fw triangle = pti_lit(k, PTI_LIT_TRIANGLE, light), root = pti_fw_sqrt(u->light0);
     const pti_mw is_triangle = pti_fw_lt(pti_fw_set(0), triangle);
@@ -10190,7 +10200,7 @@ PTI_INLINE pti_fw pti_lock_flat_point(const pti_lockstep *k, pti_uw light, const
 }
 
 /* Asks a point of a light for its light; how many rays that took. */
-PTI_INLINE int pti_lock_direct(const pti_lockstep *k, const pti_lock_surface *s, pti_w3 albedo, pti_mw active, const pti_lock_numbers *u,
+PTI_LOCK_INLINE int pti_lock_direct(const pti_lockstep *k, const pti_lock_surface *s, pti_w3 albedo, pti_mw active, const pti_lock_numbers *u,
                                pti_lane_row *row, int technique, pt_heuristic heuristic)
 {
     const pti_fw zero = pti_fw_set(0), inverse_pi = pti_fw_set((float)(1 / PT_PI));
@@ -10233,7 +10243,7 @@ PTI_INLINE int pti_lock_direct(const pti_lockstep *k, const pti_lock_surface *s,
 }
 
 /* A direction about n by the cosine, as pt_warp_cosine has it; *z: the cosine. */
-PTI_INLINE pti_w3 pti_lock_cosine(pti_w3 n, pti_fw u, pti_fw v, pti_fw *z)
+PTI_LOCK_INLINE pti_w3 pti_lock_cosine(pti_w3 n, pti_fw u, pti_fw v, pti_fw *z)
 {
     const pti_fw two = pti_fw_set(2), shift = pti_fw_set((float)(PTI_2_M24 - 1)), one = pti_fw_set(1);
     const pti_fw a = pti_fw_madd(two, u, shift), b = pti_fw_madd(two, v, shift);
@@ -10251,7 +10261,7 @@ PTI_INLINE pti_w3 pti_lock_cosine(pti_w3 n, pti_fw u, pti_fw v, pti_fw *z)
 /* Mirrors and glass: the next direction, and what beta is multiplied by. Glass that is left within 16 e of an edge does not
    bend: a face is wider than it is by rounding, and a ray that passes by could hit its back, be reflected into the glass
    at an angle that no refraction gives, and never get out. */
-PTI_INLINE pti_w3 pti_lock_specular(const pti_lockstep *k, const pti_lock_surface *s, pti_w3 d, pti_fw u, pti_w3 *weight, pti_lane_row *row)
+PTI_LOCK_INLINE pti_w3 pti_lock_specular(const pti_lockstep *k, const pti_lock_surface *s, pti_w3 d, pti_fw u, pti_w3 *weight, pti_lane_row *row)
 {
     const pti_fw one = pti_fw_set(1), zero = pti_fw_set(0), two_cosines = pti_fw_add(s->cosine, s->cosine);
     const pti_fw ior = pti_fw_gather(k->of[PTI_OF_IOR], s->i), eta = pti_fw_select(s->front, pti_fw_div(one, ior), ior);
@@ -10274,7 +10284,7 @@ PTI_INLINE pti_w3 pti_lock_specular(const pti_lockstep *k, const pti_lock_surfac
 }
 
 /* Russian roulette, as pti_roulette; the lanes that go on. */
-PTI_INLINE pti_mw pti_lock_roulette(const pt_li_options *options, pti_lane_row *row, pti_w3 *beta, pti_fw u)
+PTI_LOCK_INLINE pti_mw pti_lock_roulette(const pt_li_options *options, pti_lane_row *row, pti_w3 *beta, pti_fw u)
 {
     const int constant = options->roulette == PT_ROULETTE_CONSTANT;
     const int start = options->roulette_start > 0 ? options->roulette_start : constant ? 1 : 3;
@@ -14437,7 +14447,10 @@ PTDEF const pt_scene_entry *pt_scene_find(const char *name)
 
    0.3.0 (2026-11-22)  models (pt_load_obj: OBJ with MTL and textures), PNG and all PPM read, film files with a checksum
                        (pt_film_write, pt_film_read), PPM of four kinds, files synced before they are renamed; rays keep
-                       the digits that float loses, so that nothing leaks far from the origin; x87 is refused.
+                       the digits that float loses, so that nothing leaks far from the origin; x87 is refused. A wide tree of
+                       eight children a node, built on several threads, and lanes for small scenes, find the same hits
+                       faster (PT_NO_SIMD and PT_NO_INTRINSICS leave them out, scene.tree chooses); pt_parallel_fn
+                       stands with the threads, since pt_commit uses it, too.
    0.2.0 (2026-11-22)  what the lecture names up to importance sampling: GGX metal and glass, measured eta and k,
                        Phong, Blinn-Phong, Oren-Nayar, coat, MERL tables and a virtual gonioreflectometer, textures;
                        spot, parallel and image environment light; pixel filters; local, Whitted, distribution and

@@ -8,10 +8,16 @@
    or limit that the value is compared with, `ratio` is value / reference: the figure to quote, since absolute
    speeds of one machine say little about another. One thread, CPU seconds. */
 
+#define _POSIX_C_SOURCE 200809L
 #define PATHTRACER_IMPLEMENTATION
 #include "pathtracer.h"
 
 #include <stdlib.h>
+#if defined(__unix__) || defined(__APPLE__)
+#include <sys/types.h>
+#include <sys/wait.h>
+#include <unistd.h>
+#endif
 
 enum { ROUNDS = 5, MAX_ROWS = 32, RAYS = 1 << 16, TORUS_RINGS = 512, TORUS_SECTORS = 128 };
 
@@ -207,7 +213,9 @@ static void bench_scenes(void)
 
 /* ---- rendering ----------------------------------------------------------------------------------------- */
 
-/* Million rays per second of rendering the scene named `argument`, one thread; flag 1: the general body. */
+enum { AS_IT_IS, ONE_AT_A_TIME, GENERAL };
+
+/* Million rays per second of rendering the scene named `argument`, one thread; flag: by which body. */
 static double measure_render(const row *self)
 {
     pt_scene scene = PT_SCENE_INIT;
@@ -219,7 +227,8 @@ static double measure_render(const row *self)
     desc.width = desc.height = 64;
     desc.spp = 32;
     desc.threads = 1;
-    desc.general_body = self->flag;
+    desc.no_lockstep = self->flag == ONE_AT_A_TIME;
+    desc.general_body = self->flag == GENERAL;
     if (pt_scene_find(self->argument)->make(&scene, &desc.camera) == PT_OK &&
         pt_render(&scene, &desc, &film, &report) == PT_OK)
         speed = 1e-6 * (double)report.rays / report.cpu_seconds;
@@ -229,23 +238,132 @@ static double measure_render(const row *self)
     return speed;
 }
 
-/* What the instance for diffuse scenes saves, and all scenes as they are rendered. */
-static void bench_render(void)
+/* Renders a scene by a body for a table of what was left out. */
+static int render_body(const pt_scene *scene, const pt_camera *camera, int body, pt_film *film, pt_report *report)
 {
-    row rows[MAX_ROWS];
-    int count, i, n = 0;
+    pt_render_desc desc = pt_render_defaults();
+
+    desc.camera = *camera;
+    desc.width = desc.height = 32;
+    desc.spp = 8;
+    desc.threads = 1;
+    desc.no_lockstep = body == ONE_AT_A_TIME;
+    desc.general_body = body == GENERAL;
+    return pt_render(scene, &desc, film, report) == PT_OK;
+}
+
+/* What each scene needs, which body renders it, and whether the smallest one for one path at a time has the bits of the general
+   one (value 1). */
+static void bench_needs(void)
+{
+    int count, i;
     const pt_scene_entry *scenes = pt_scenes(&count);
 
-    rows[n] = make_row("general_body.", "cornell", "Mrays/s", measure_render);
-    rows[n].argument = "cornell";
-    rows[n++].flag = 1;
-    for (i = 0; i < count && n < MAX_ROWS; i++) {
-        rows[n] = make_row("render.", scenes[i].name, "Mrays/s", measure_render);
-        if (strcmp(scenes[i].name, "cornell") == 0) rows[n].reference = 0;
-        rows[n++].argument = scenes[i].name;
+    for (i = 0; i < count; i++) {
+        pt_scene scene = PT_SCENE_INIT;
+        pt_film film[3] = {PT_FILM_INIT, PT_FILM_INIT, PT_FILM_INIT};
+        pt_report report[3] = {PT_REPORT_INIT, PT_REPORT_INIT, PT_REPORT_INIT};
+        char words[512], name[96], *comma;
+        pt_camera camera;
+        int k, ok = scenes[i].make(&scene, &camera) == PT_OK, bits = 0;
+
+        for (k = 0; k < 3; k++) ok = ok && render_body(&scene, &camera, k, &film[k], &report[k]);
+        snprintf(name, sizeof name, "needs.%s", scenes[i].name);
+        if (ok && is_wanted(name)) {
+            const unsigned needs = pt_scene_needs(&scene);
+            for (k = 0; k < 23; k++) bits += (int)(needs >> k & 1u);
+            pt_scene_needs_string(&scene, words, sizeof words);
+            for (comma = words; (comma = strchr(comma, ',')) != NULL;) *comma = ' ';
+            printf("needs.%s,%d,of 23 features: %s,23,%.3f\n", scenes[i].name, bits, words, bits / 23.0);
+            k = memcmp(film[1].half[0], film[2].half[0], 3 * 32 * 32 * sizeof(double)) == 0 &&
+                memcmp(film[1].half[1], film[2].half[1], 3 * 32 * 32 * sizeof(double)) == 0;
+            printf("same_bits.%s,%d,%s body; one at a time: %s body,1,%d\n", scenes[i].name, k, report[0].body, report[1].body, k);
+        }
+        for (k = 0; k < 3; k++) {
+            pt_film_free(&film[k]);
+            pt_report_free(&report[k]);
+        }
+        pt_scene_free(&scene);
     }
-    if (is_wanted("render.") || is_wanted("general_body.")) run_group(rows, n, ROUNDS);
+    fflush(stdout);
 }
+
+/* What bodies save: each scene by the general one, by the smallest for one path at a time, and as it is rendered. */
+static void bench_render(void)
+{
+    static const char *const prefix[3] = {"render.", "one_at_a_time.", "general_body."};
+    int count, i, body;
+    const pt_scene_entry *scenes = pt_scenes(&count);
+
+    for (i = 0; i < count; i++) {
+        row rows[3];
+        int wanted = 0;
+        for (body = 0; body < 3; body++) {
+            row *r = &rows[2 - body]; /* the general body first: it is the reference */
+            *r = make_row(prefix[body], scenes[i].name, "Mrays/s", measure_render);
+            r->argument = scenes[i].name;
+            r->flag = body;
+            if (body != GENERAL) r->reference = 0;
+            wanted |= is_wanted(r->name);
+        }
+        if (wanted) run_group(rows, 3, ROUNDS);
+    }
+}
+
+/* ---- threads ------------------------------------------------------------------------------------------- */
+
+#if defined(__unix__) || defined(__APPLE__)
+/* Wall seconds of `processes` processes that each render the Cornell box with `threads` threads. */
+static double wall_seconds(int processes, int threads)
+{
+    pt_scene scene = PT_SCENE_INIT;
+    pt_render_desc desc = pt_render_defaults();
+    double start, seconds = -1;
+    int i, failed = 0, status;
+
+    desc.width = desc.height = 256;
+    desc.spp = 64 * (uint32_t)threads; /* as much for each thread */
+    desc.threads = threads;
+    desc.no_lockstep = 1;
+    if (pt_scene_cornell(&scene, &desc.camera) != PT_OK) return -1;
+    desc.spp /= 4;
+    fflush(stdout);
+    start = pt_wall_seconds();
+    for (i = 0; i < processes; i++) {
+        const pid_t child = fork();
+        if (child == 0) {
+            pt_film film = PT_FILM_INIT;
+            _exit(pt_render(&scene, &desc, &film, NULL) != PT_OK);
+        }
+        failed |= child < 0;
+    }
+    for (i = 0; i < processes; i++) failed |= wait(&status) < 0 || status != 0;
+    seconds = pt_wall_seconds() - start;
+    pt_scene_free(&scene);
+    return failed ? -1 : seconds;
+}
+
+/* How often the same work is done in a second by two threads of one process, or by two processes of one. */
+static double measure_threads(const row *self)
+{
+    const double seconds = self->flag ? wall_seconds(1, 2) : wall_seconds(2, 1);
+
+    return seconds > 0 ? 1 / seconds : -1;
+}
+
+static void bench_threads(void)
+{
+    row rows[2];
+
+    rows[0] = make_row("threads.", "two_processes", "renders/s", measure_threads);
+    rows[1] = make_row("threads.", "two_threads", "renders/s", measure_threads);
+    rows[1].flag = 1;
+    rows[1].reference = 0;
+    if (is_wanted(rows[0].name) || is_wanted(rows[1].name)) run_group(rows, 2, ROUNDS);
+}
+#else
+static void bench_threads(void) {}
+#endif
 
 /* ---- compiling ----------------------------------------------------------------------------------------- */
 
@@ -286,14 +404,15 @@ static double measure_object_size(const row *self)
 }
 
 #define ALL_LEFT_OUT \
-    "-DPT_ONLY_PATH -DPT_NO_THREADS -DPT_NO_STDIO -DPT_NO_BVH -DPT_NO_ENVIRONMENT -DPT_NO_REPORT " \
+    "-DPT_ONLY_PATH -DPT_NO_THREADS -DPT_NO_STDIO -DPT_NO_BVH -DPT_NO_SIMD -DPT_NO_ENVIRONMENT -DPT_NO_REPORT " \
     "-DPT_NO_MICROFACET -DPT_NO_PHONG -DPT_NO_COAT -DPT_NO_MEASURED -DPT_NO_TEXTURES"
 
 static void bench_compile(void)
 {
     static const char *const variants[][2] = {
         {"whole", ""}, {"PT_ONLY_PATH", "-DPT_ONLY_PATH"}, {"PT_NO_THREADS", "-DPT_NO_THREADS"},
-        {"PT_NO_STDIO", "-DPT_NO_STDIO"}, {"PT_NO_FILES", "-DPT_NO_FILES"}, {"PT_NO_BVH", "-DPT_NO_BVH"},
+        {"PT_NO_STDIO", "-DPT_NO_STDIO"}, {"PT_NO_FILES", "-DPT_NO_FILES"}, {"PT_NO_OBJ", "-DPT_NO_OBJ"}, {"PT_NO_BVH", "-DPT_NO_BVH"},
+        {"PT_NO_SIMD", "-DPT_NO_SIMD"}, {"PT_NO_INTRINSICS", "-DPT_NO_INTRINSICS"},
         {"PT_NO_ENVIRONMENT", "-DPT_NO_ENVIRONMENT"}, {"PT_NO_OBSERVER", "-DPT_NO_OBSERVER"},
         {"PT_NO_MICROFACET", "-DPT_NO_MICROFACET"}, {"PT_NO_PHONG", "-DPT_NO_PHONG"}, {"PT_NO_COAT", "-DPT_NO_COAT"},
         {"PT_NO_MEASURED", "-DPT_NO_MEASURED"}, {"PT_NO_TEXTURES", "-DPT_NO_TEXTURES"}, {"PT_NO_WHITTED", "-DPT_NO_WHITTED"},
@@ -322,7 +441,9 @@ int main(int argc, char **argv)
     printf("name,value,unit,reference,ratio\n");
     bench_scenes();
     bench_torus();
+    bench_needs();
     bench_render();
+    bench_threads();
     bench_compile();
     return 0;
 }

@@ -1,6 +1,6 @@
 /* embree.c - the rays of [PT-07b] against those of Embree 3, in one process, on the same meshes and rays.
 
-   run:    make bench-embree                      three builds of this: AVX2, default flags, plain C lanes
+   run:    make bench-embree                      three builds of this: -march=native, default flags, plain C lanes
    or:     cc -O2 -ffp-contract=off -I. tests/bench/embree.c -o embree -lembree3 -lm -pthread
            ./embree [mesh ...]                    cornell knot-1k knot-70k room-118k blob-870k grid-1m icosphere
 
@@ -30,9 +30,7 @@ enum { RUNS = 9, SIDE = 512, RAYS = SIDE * SIDE, CHUNK = RAYS / 16 };
 enum { PRIMARY, DIFFUSE, RANDOM, SHADOW, SETS };
 enum { OURS, FULL, FAST, ROBUST, KERNELS };
 static const char *const SET_NAMES[SETS] = {"primary", "diffuse", "random", "shadow"};
-#ifndef VARIANT
 #define VARIANT (PTI_LANES == 2 ? "avx2" : PTI_LANES == 1 ? "sse2" : "plain")
-#endif
 
 typedef struct mesh {
     pt_vec3 *v;
