@@ -829,102 +829,110 @@ static void cosines(void)
     check_cells("directions by the cosine", &c);
 }
 
-/* Points of lights, and the density that goes with them. */
+/* Points of lights, and the density that goes with them: a ball seen from three places, a parallelogram, a triangle. */
+enum { OUTSIDE, NEAR_BY, INSIDE, FLAT, CORNERED, LIT };
+static const char *const lit_names[LIT] = {"ball from outside", "ball from near by", "ball from inside", "parallelogram", "triangle"};
+static const double BALL_RADIUS = 0.4;
+
+typedef struct lit {
+    cells c;
+    double density, height, off; /* of the samples; how far points are off, and directions, in e */
+} lit;
+
+/* 1 - cos of the cone in which the ball is seen; all directions from inside. */
+static double cone_of(int kind, double distance)
+{
+    const double sine = BALL_RADIUS / distance;
+    return kind == INSIDE ? 2 : sine * sine / (1 + sqrt(1 - sine * sine));
+}
+
+static void ball_points(const pti_lockstep *ready, int kind, int light, pt_vec3 p, const pti_lock_numbers *u, lit *out)
+{
+    const pti_d3 centre = pti_d(0.3, -0.2, 0.5), eye = pti_d_from(p), way = pti_d_sub(centre, eye), axis = pti_d_normalize(way);
+    const double e = (double)ready->e, lifted = BALL_RADIUS + (kind == INSIDE ? -2 : 2) * e;
+    pti_lane_row from[3], q[3], to[3], d;
+    pti_w3 point, direction;
+    int k;
+    for (k = 0; k < PTI_WIDTH; k++) set3(from, k, p);
+    d.f = pti_lock_ball_point(ready, pti_uw_set((uint32_t)light), pti_row3(from), u, &point, &direction);
+    pti_row3_set(q, point);
+    pti_row3_set(to, direction);
+    out->density = (double)d.v[0];
+    for (k = 0; k < PTI_WIDTH; k++) {
+        const pti_d3 at = get3(q, k), w = get3(to, k), seen = pti_d_sub(at, eye);
+        out->height = fmax(out->height, fabs(pti_d_length(pti_d_sub(at, centre)) - lifted) / e);
+        out->off = fmax(out->off, pti_d_length(pti_d_sub(seen, pti_d_scale(w, pti_d_length(seen)))) / e);
+        count_cell(&out->c, (1 - pti_d_dot(w, axis)) / cone_of(kind, pti_d_length(way)), azimuth(v3(axis.x, axis.y, axis.z), w));
+    }
+}
+
+static pti_d3 lit_row(const pti_lockstep *ready, int row, int light)
+{
+    return pti_d((double)ready->light[row][light], (double)ready->light[row + 1][light], (double)ready->light[row + 2][light]);
+}
+
+static void flat_points(const pti_lockstep *ready, int kind, int light, const pti_lock_numbers *u, lit *out)
+{
+    const pti_d3 x = lit_row(ready, PTI_LIT_E1, light), y = lit_row(ready, PTI_LIT_E2, light), n = pti_d_normalize(pti_d_cross(x, y));
+    const double xx = pti_d_dot(x, x), yy = pti_d_dot(y, y), xy = pti_d_dot(x, y), e = (double)ready->e;
+    pti_lane_row q[3], d;
+    pti_w3 point, normal;
+    int k;
+    d.f = pti_lock_flat_point(ready, pti_uw_set((uint32_t)light), u, &point, &normal);
+    pti_row3_set(q, point);
+    out->density = (double)d.v[0];
+    for (k = 0; k < PTI_WIDTH; k++) {
+        const pti_d3 r = pti_d_sub(get3(q, k), lit_row(ready, PTI_LIT_P, light));
+        const double a = (pti_d_dot(r, x) * yy - pti_d_dot(r, y) * xy) / (xx * yy - xy * xy), b = (pti_d_dot(r, y) * xx - pti_d_dot(r, x) * xy) / (xx * yy - xy * xy);
+        out->height = fmax(out->height, fabs(pti_d_dot(r, n) - 2 * e) / e);
+        if (kind == FLAT) count_cell(&out->c, a, b);
+        else count_cell(&out->c, (a + b) * (a + b), a + b > 1e-4 ? b / (a + b) : 0.5);
+    }
+}
+
+/* The light of that kind, and what the density should be. */
+static int find_light(const pt_scene *s, const pti_lockstep *ready, int kind, pt_vec3 p, double *exact)
+{
+    const pt_shape shape = kind < FLAT ? PT_SHAPE_SPHERE : kind == FLAT ? PT_SHAPE_PARALLELOGRAM : PT_SHAPE_TRIANGLE;
+    int k, light = 0;
+    for (k = 0; k < ready->light_count; k++)
+        if ((ready->light[PTI_LIT_RADIUS][k] > 0 ? OUTSIDE : ready->light[PTI_LIT_TRIANGLE][k] > 0 ? CORNERED : FLAT) == (kind < FLAT ? OUTSIDE : kind)) light = k;
+    for (k = 0; k < (int)s->light_count; k++)
+        if (s->primitives[s->lights[k].primitive].shape == shape)
+            *exact = s->lights[k].pmf / (kind < FLAT ? 2 * PT_PI * cone_of(kind, pti_d_length(pti_d_between(p, v3(0.3, -0.2, 0.5)))) : s->lights[k].area);
+    return light;
+}
+
 static void lights(void)
 {
-    enum { FROM = 5 };
-    static const char *const names[FROM] = {"ball from outside", "ball from near by", "ball from inside", "parallelogram", "triangle"};
+    static lit out;
     pt_pcg32 rng = pt_pcg32_make(pt_test_seed(720000), 7);
     stage s;
     pti_lockstep ready;
-    int kind, i, k;
+    int kind, i;
     memset(&s, 0, sizeof s);
-    add_ball(&s.scene, &HERE, 0.3, -0.2, 0.5, 0.4, lamp(&s.scene, 1, 1, 1));
+    add_ball(&s.scene, &HERE, 0.3, -0.2, 0.5, BALL_RADIUS, lamp(&s.scene, 1, 1, 1));
     pt_add_parallelogram(&s.scene, v3(1, 0.2, 0.1), v3(0.3, 0.5, -0.2), v3(-0.4, 0.1, 0.6), lamp(&s.scene, 2, 1, 0));
     pt_add_triangle(&s.scene, v3(-1, 0.2, 0.1), v3(-0.3, 0.8, -0.2), v3(-0.4, 0.1, 0.9), lamp(&s.scene, 0, 1, 3));
     commit(&s);
     pt_test_source("uniform in the cone, or per area");
-    if (!pti_lockstep_make(&ready, &s.scene, v3(0, 0, 0))) {
-        pt_check(0, "lights", "not for lanes");
-        return;
-    }
-    for (kind = 0; kind < FROM; kind++) {
-        static cells c;
-        const int ball = kind < 3, n = (int)pt_test_all_samples(10000);
-        const pt_vec3 p = kind == 0 ? v3(-0.9, 1.2, 0.1) : kind == 1 ? v3(0.3, -0.2, 0.5 + 0.4 * 1.01) : v3(0.4, -0.3, 0.3);
-        double off = 0, height = 0, density = 0, exact;
-        int light = 0;
-        memset(&c, 0, sizeof c);
-        for (k = 0; k < ready.light_count; k++) {
-            const int is = ready.light[PTI_LIT_RADIUS][k] > 0 ? 0 : ready.light[PTI_LIT_TRIANGLE][k] > 0 ? 4 : 3;
-            if (is == (ball ? 0 : kind)) light = k;
-        }
-        for (i = 0; i < n; i++) {
-            pti_lane_row from[3], q[3], to[3], d;
+    pt_check(pti_lockstep_make(&ready, &s.scene, v3(0, 0, 0)), "lights", "not for lanes");
+    for (kind = 0; kind < LIT; kind++) {
+        const pt_vec3 p = kind == OUTSIDE ? v3(-0.9, 1.2, 0.1) : kind == NEAR_BY ? v3(0.3, -0.2, 0.5 + 1.01 * BALL_RADIUS) : v3(0.4, -0.3, 0.3);
+        double exact = 0;
+        const int light = find_light(&s.scene, &ready, kind, p, &exact);
+        memset(&out, 0, sizeof out);
+        for (i = 0; i < (int)pt_test_all_samples(10000); i++) {
             pti_lock_numbers u;
-            const pti_d3 centre = pti_d(0.3, -0.2, 0.5);
             memset(&u, 0, sizeof u);
             u.light0 = draws(&rng);
             u.light1 = draws(&rng);
-            for (k = 0; k < PTI_WIDTH; k++) set3(from, k, p);
-            if (ball) {
-                pti_w3 point, direction;
-                d.f = pti_lock_ball_point(&ready, pti_uw_set((uint32_t)light), pti_row3(from), &u, &point, &direction);
-                pti_row3_set(q, point);
-                pti_row3_set(to, direction);
-            } else {
-                pti_w3 point, normal;
-                d.f = pti_lock_flat_point(&ready, pti_uw_set((uint32_t)light), &u, &point, &normal);
-                pti_row3_set(q, point);
-                pti_row3_set(to, normal);
-            }
-            density = (double)d.v[0];
-            for (k = 0; k < PTI_WIDTH; k++) {
-                const pti_d3 at = get3(q, k), w = get3(to, k), eye = pti_d_from(p);
-                if (ball) {
-                    const double far = pti_d_length(pti_d_sub(at, centre)), side = kind == 2 ? -1 : 1;
-                    const pti_d3 c0 = pti_d_sub(centre, eye), axis = pti_d_normalize(c0);
-                    const double sine = 0.4 / pti_d_length(c0), omc = kind == 2 ? 2 : sine * sine / (1 + sqrt(1 - sine * sine));
-                    const pti_d3 way = pti_d_normalize(pti_d_sub(at, eye));
-                    height = fmax(height, fabs(far - 0.4 - side * 2 * (double)ready.e));
-                    off = fmax(off, pti_d_length(pti_d_sub(way, w)) * (pti_d_length(pti_d_sub(at, eye)) / (double)ready.e));
-                    count_cell(&c, (1 - pti_d_dot(w, axis)) / omc, azimuth(v3(axis.x, axis.y, axis.z), w));
-                } else {
-                    double corner[3], e1[3], e2[3], a, b, det;
-                    pti_d3 x, y, r;
-                    int j;
-                    for (j = 0; j < 3; j++) {
-                        corner[j] = (double)ready.light[PTI_LIT_P + j][light];
-                        e1[j] = (double)ready.light[PTI_LIT_E1 + j][light];
-                        e2[j] = (double)ready.light[PTI_LIT_E2 + j][light];
-                    }
-                    x = pti_d(e1[0], e1[1], e1[2]);
-                    y = pti_d(e2[0], e2[1], e2[2]);
-                    r = pti_d_sub(at, pti_d(corner[0], corner[1], corner[2]));
-                    height = fmax(height, fabs(pti_d_dot(r, pti_d_normalize(pti_d_cross(x, y))) - 2 * (double)ready.e));
-                    det = pti_d_dot(x, x) * pti_d_dot(y, y) - pti_d_dot(x, y) * pti_d_dot(x, y);
-                    a = (pti_d_dot(r, x) * pti_d_dot(y, y) - pti_d_dot(r, y) * pti_d_dot(x, y)) / det;
-                    b = (pti_d_dot(r, y) * pti_d_dot(x, x) - pti_d_dot(r, x) * pti_d_dot(x, y)) / det;
-                    if (kind == 3) count_cell(&c, a, b);
-                    else count_cell(&c, (a + b) * (a + b), a + b > 1e-4 ? b / (a + b) : 0.5);
-                }
-            }
+            if (kind < FLAT) ball_points(&ready, kind, light, p, &u, &out);
+            else flat_points(&ready, kind, light, &u, &out);
         }
-        {
-            double pmf = 0;
-            const double area = kind == 3 ? pti_d_length(pti_d_cross(pti_d(0.3, 0.5, -0.2), pti_d(-0.4, 0.1, 0.6)))
-                                          : 0.5 * pti_d_length(pti_d_cross(pti_d(0.7, 0.6, -0.3), pti_d(0.6, -0.1, 0.8)));
-            const double sine = 0.4 / pti_d_length(pti_d_between(p, v3(0.3, -0.2, 0.5))), omc = kind == 2 ? 2 : sine * sine / (1 + sqrt(1 - sine * sine));
-            for (k = 0; k < (int)s.scene.light_count; k++) {
-                const pt_shape shape = s.scene.primitives[s.scene.lights[k].primitive].shape;
-                if (shape == (ball ? PT_SHAPE_SPHERE : kind == 3 ? PT_SHAPE_PARALLELOGRAM : PT_SHAPE_TRIANGLE)) pmf = s.scene.lights[k].pmf;
-            }
-            exact = ball ? pmf / (2 * PT_PI * omc) : pmf / area;
-        }
-        pt_check(fabs(density - exact) <= 1e-5 * exact, names[kind], "density %.8g, exactly %.8g", density, exact);
-        pt_check(height <= (double)ready.e, names[kind], "points are off by %.3g e", height / (double)ready.e);
-        pt_check(!ball || off <= 8, names[kind], "the direction that was drawn is off by %.3g e", off);
-        check_cells(label("points of a %s", names[kind]), &c);
+        pt_check(fabs(out.density - exact) <= 1e-5 * exact, lit_names[kind], "density %.8g, exactly %.8g", out.density, exact);
+        pt_check(out.height <= 1 && out.off <= 8, lit_names[kind], "points are off by %.3g e, from the direction drawn by %.3g e", out.height, out.off);
+        check_cells(label("points of a %s", lit_names[kind]), &out.c);
     }
     pt_scene_free(&s.scene);
 }
