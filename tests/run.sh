@@ -55,7 +55,7 @@ sum()
             next
         }
         /^exit status [0-9]+$/ { status = $3; next }
-        /^[a-z_]+: [0-9]+ passed, [0-9]+ failed$/ { counted = 1; p = $2; f = $4; next }
+        /^[a-z_0-9]+: [0-9]+ passed, [0-9]+ failed$/ { counted = 1; p = $2; f = $4; next }
         /FAIL/ { bad[++bads] = name ": " $0 }
         END {
             close_log()
@@ -83,7 +83,7 @@ seeds()
         fi
         for log in build/test/test_*.log; do echo "== $log"; cat "$log"; done > "$dir/$seed.log"
         echo "seed $seed: $(tail -n 1 "$dir/$seed.out")"
-        grep -E '^test_[a-z_]+: .*FAIL' "$dir/$seed.out"
+        grep -E '^test_[a-z_0-9]+: .*FAIL' "$dir/$seed.out"
         seed=$((seed + 1))
     done
     over_seeds "$dir" $passed $failed

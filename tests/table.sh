@@ -95,7 +95,7 @@ done | awk -v words='(path|plain|light|sobol|independent|stratified|red|green|bl
         if ($3 > 0) exactly = exactly (exactly == "" ? "" : ", ") $2 " " $3
         next
     }
-    /^[a-z_]+: [0-9]+ passed, [0-9]+ failed$/ {
+    /^[a-z_0-9]+: [0-9]+ passed, [0-9]+ failed$/ {
         if ($1 ~ /^check_/) exactly = $2 " passed"
         passed += $2; failed += $4
         next
