@@ -1979,8 +1979,10 @@ extern "C" {
 #define PTI_2_M32 2.3283064365386962890625e-10
 #define PTI_2_M53 1.1102230246251565404e-16
 
-#if defined(__GNUC__)
+#if defined(__OPTIMIZE__)
 #define PTI_INLINE static inline __attribute__((always_inline, unused))
+#elif defined(__GNUC__)
+#define PTI_INLINE static inline __attribute__((unused)) /* -O0: quick to compile, and to step through */
 #else
 #define PTI_INLINE static inline
 #endif
@@ -9401,14 +9403,6 @@ PTI_INLINE pti_mw pti_mw_of_bits(unsigned bits)
 #endif
 #endif
 
-/* Kernels are one piece of code where lanes are registers. Arrays of eight floats, a register too many for compilers that see a
-   thousand of them at once, are better off in functions. */
-#if PTI_LANES > 0
-#define PTI_LOCK_INLINE PTI_INLINE
-#else
-#define PTI_LOCK_INLINE static
-#endif
-
 /* Operations on words; n: how far a shift goes. */
 #if PTI_WIDTH == 16
 #define PTI_UW(name, wide, avx, sse, plain) \
@@ -9548,7 +9542,7 @@ PTI_INLINE pti_w3 pti_w3_set(const float v[3]) { return pti_w3_make(pti_fw_set(v
 PTI_INLINE pti_w3 pti_w3_normalize(pti_w3 a) { return pti_w3_scale(a, pti_fw_div(pti_fw_set(1), pti_fw_sqrt(pti_w3_dot(a, a)))); }
 
 /* sin and cos of x in [-pi/4, pi/4], by their series: off by less than 2^-24 and 2^-23. */
-PTI_LOCK_INLINE void pti_fw_sincos(pti_fw x, pti_fw *s, pti_fw *c)
+PTI_INLINE8 void pti_fw_sincos(pti_fw x, pti_fw *s, pti_fw *c)
 {
     const pti_fw q = pti_fw_mul(x, x);
     pti_fw p = pti_fw_madd(q, pti_fw_set(1 / 362880.f), pti_fw_set(-1 / 5040.f));
@@ -9844,7 +9838,7 @@ typedef struct pti_lock_best {
 enum { PTI_LOCK_NEAREST, PTI_LOCK_ANY, PTI_LOCK_CAREFUL };
 
 /* A primitive that is met at t, `margin` inside its edges; slack > 0 from its front. */
-PTI_LOCK_INLINE pti_mw pti_lock_keep(pti_lock_best *best, pti_fw t, pti_fw margin, pti_fw slack, int i, const int how)
+PTI_INLINE8 pti_mw pti_lock_keep(pti_lock_best *best, pti_fw t, pti_fw margin, pti_fw slack, int i, const int how)
 {
     const pti_fw zero = pti_fw_set(0);
     pti_mw met = pti_mw_and(pti_fw_lt(zero, t), pti_fw_le(zero, pti_fw_add(margin, pti_fw_abs(slack))));
@@ -9863,7 +9857,7 @@ PTI_LOCK_INLINE pti_mw pti_lock_keep(pti_lock_best *best, pti_fw t, pti_fw margi
 }
 
 /* Rectangles across axis `kind`, whose coordinates are o.x, d.x after a turn of the axes. */
-PTI_LOCK_INLINE pti_mw pti_lock_rectangles(const pti_lockstep *k, int kind, pti_w3 o, pti_w3 d, float e, pti_lock_best *best, pti_mw met, const int how)
+PTI_INLINE8 pti_mw pti_lock_rectangles(const pti_lockstep *k, int kind, pti_w3 o, pti_w3 d, float e, pti_lock_best *best, pti_mw met, const int how)
 {
     const pti_fw inverse = pti_fw_div(pti_fw_set(1), d.x), slack = pti_fw_mul(inverse, pti_fw_set(-2 * e));
     const int end = how == PTI_LOCK_ANY ? k->blockers[kind] : k->begin[kind + 1];
@@ -9880,12 +9874,12 @@ PTI_LOCK_INLINE pti_mw pti_lock_rectangles(const pti_lockstep *k, int kind, pti_
     return met;
 }
 
-PTI_LOCK_INLINE pti_fw pti_lock_height(const float *row, pti_w3 p)
+PTI_INLINE8 pti_fw pti_lock_height(const float *row, pti_w3 p)
 {
     return pti_w3_dot_add(pti_w3_set(row), p, pti_fw_set(row[3]));
 }
 
-PTI_LOCK_INLINE pti_mw pti_lock_flats(const pti_lockstep *k, int kind, pti_w3 o, pti_w3 d, float e, pti_lock_best *best, pti_mw met, const int how)
+PTI_INLINE8 pti_mw pti_lock_flats(const pti_lockstep *k, int kind, pti_w3 o, pti_w3 d, float e, pti_lock_best *best, pti_mw met, const int how)
 {
     const int end = how == PTI_LOCK_ANY ? k->blockers[kind] : k->begin[kind + 1];
     int i;
@@ -9907,7 +9901,7 @@ PTI_LOCK_INLINE pti_mw pti_lock_flats(const pti_lockstep *k, int kind, pti_w3 o,
 
 /* As pti_sphere does it, for d of length 1. A ray that starts less than 5 e inside comes from something that touches the
    ball, and does not see it. */
-PTI_LOCK_INLINE pti_mw pti_lock_balls(const pti_lockstep *k, pti_w3 o, pti_w3 d, pti_lock_best *best, pti_mw met, const int how)
+PTI_INLINE8 pti_mw pti_lock_balls(const pti_lockstep *k, pti_w3 o, pti_w3 d, pti_lock_best *best, pti_mw met, const int how)
 {
     const pti_fw zero = pti_fw_set(0);
     int i;
@@ -9928,7 +9922,7 @@ PTI_LOCK_INLINE pti_mw pti_lock_balls(const pti_lockstep *k, pti_w3 o, pti_w3 d,
 }
 
 /* All primitives against a ray in each lane, d of length 1. PTI_LOCK_ANY: those that can block. */
-PTI_LOCK_INLINE pti_mw pti_lock_ask(const pti_lockstep *k, pti_w3 o, pti_w3 d, float e, pti_lock_best *best, const int how)
+PTI_INLINE8 pti_mw pti_lock_ask(const pti_lockstep *k, pti_w3 o, pti_w3 d, float e, pti_lock_best *best, const int how)
 {
     pti_mw met = pti_mw_of_bits(0);
     if (k->begin[1] > k->begin[0]) met = pti_lock_rectangles(k, 0, o, d, e, best, met, how);
@@ -9955,7 +9949,7 @@ static void pti_lock_nearest(const pti_lockstep *k, pti_w3 o, pti_w3 d, float e,
 /* --- numbers --- */
 
 /* xoroshiro64* [Bla21]: a + b -> 24 bits of each lane as a float in [0,1). */
-PTI_LOCK_INLINE pti_fw pti_lock_next(pti_uw *a, pti_uw *b)
+PTI_INLINE8 pti_fw pti_lock_next(pti_uw *a, pti_uw *b)
 {
     const pti_uw r = pti_uw_mul(*a, pti_uw_set(0x9e3779bbu)), x = pti_uw_xor(*a, *b);
     *a = pti_uw_xor(pti_uw_xor(pti_uw_or(pti_uw_shl(*a, 26), pti_uw_shr(*a, 6)), x), pti_uw_shl(x, 9));
@@ -9978,7 +9972,7 @@ PTI_INLINE pti_uw pti_lock_reverse(pti_uw x)
 }
 
 /* pti_laine_karras and pti_sobol_reversed in lanes. */
-PTI_LOCK_INLINE pti_uw pti_lock_scramble(pti_uw x, pti_uw seed)
+PTI_INLINE8 pti_uw pti_lock_scramble(pti_uw x, pti_uw seed)
 {
     x = pti_uw_xor(x, pti_uw_mul(x, pti_uw_set(0x3d20adeau)));
     x = pti_uw_add(x, seed);
@@ -10039,7 +10033,7 @@ PTI_INLINE pti_w3 pti_gather3(const float (*table)[PTI_LOCK_MAX], int row, pti_u
 }
 
 /* The point at t, put back on its surface and away from its edges. */
-PTI_LOCK_INLINE void pti_lock_land(const pti_lockstep *k, pti_w3 o, pti_w3 d, const pti_lock_best *best, pti_lock_surface *s)
+PTI_INLINE8 void pti_lock_land(const pti_lockstep *k, pti_w3 o, pti_w3 d, const pti_lock_best *best, pti_lock_surface *s)
 {
     const pti_fw zero = pti_fw_set(0), inset = pti_fw_set(16 * k->e);
     pti_w3 n;
@@ -10073,7 +10067,7 @@ PTI_INLINE pti_mw pti_lock_is(const pti_lock_surface *s, pt_material_kind kind)
 }
 
 /* pt_mis_weight in lanes. */
-PTI_LOCK_INLINE pti_fw pti_lock_weight(pti_fw p, pti_fw q, pt_heuristic heuristic)
+PTI_INLINE8 pti_fw pti_lock_weight(pti_fw p, pti_fw q, pt_heuristic heuristic)
 {
     const pti_fw one = pti_fw_set(1), ratio = pti_fw_div(q, p);
     if (heuristic == PT_HEURISTIC_BALANCE) return pti_fw_div(one, pti_fw_add(one, ratio));
@@ -10083,7 +10077,7 @@ PTI_LOCK_INLINE pti_fw pti_lock_weight(pti_fw p, pti_fw q, pt_heuristic heuristi
 }
 
 /* 1 - cos of the cone under which spheres are seen from d2 away, squared; 2 where p is inside. */
-PTI_LOCK_INLINE pti_fw pti_lock_cone(pti_fw radius, pti_fw d2)
+PTI_INLINE8 pti_fw pti_lock_cone(pti_fw radius, pti_fw d2)
 {
     const pti_fw s2 = pti_fw_div(pti_fw_mul(radius, radius), d2), one = pti_fw_set(1);
     const pti_fw omc = pti_fw_div(s2, pti_fw_add(one, pti_fw_sqrt(pti_fw_max(pti_fw_set(0), pti_fw_sub(one, s2)))));
@@ -10091,7 +10085,7 @@ PTI_LOCK_INLINE pti_fw pti_lock_cone(pti_fw radius, pti_fw d2)
 }
 
 /* Adds the emission of what is hit, weighted. */
-PTI_LOCK_INLINE void pti_lock_emission(const pti_lockstep *k, const pti_lock_surface *s, const pti_lock_best *best, pti_lane_row *row,
+PTI_INLINE8 void pti_lock_emission(const pti_lockstep *k, const pti_lock_surface *s, const pti_lock_best *best, pti_lane_row *row,
                                   int technique, pt_heuristic heuristic)
 {
     const pti_fw zero = pti_fw_set(0), one = pti_fw_set(1), q = row[PTI_ROW_DENSITY].f;
@@ -10119,7 +10113,7 @@ PTI_LOCK_INLINE void pti_lock_emission(const pti_lockstep *k, const pti_lock_sur
 }
 
 /* The two unit vectors that make a frame with n [Duf17]. */
-PTI_LOCK_INLINE void pti_lock_frame(pti_w3 n, pti_w3 *s, pti_w3 *t)
+PTI_INLINE8 void pti_lock_frame(pti_w3 n, pti_w3 *s, pti_w3 *t)
 {
     const pti_fw zero = pti_fw_set(0), one = pti_fw_set(1), sign = pti_fw_select(pti_fw_lt(n.z, zero), pti_fw_set(-1), one);
     const pti_fw a = pti_fw_div(pti_fw_set(-1), pti_fw_add(sign, n.z)), b = pti_fw_mul(pti_fw_mul(n.x, n.y), a);
@@ -10129,7 +10123,7 @@ PTI_LOCK_INLINE void pti_lock_frame(pti_w3 n, pti_w3 *s, pti_w3 *t)
 }
 
 /* cos and sin of 2 pi u: twice the double angle of a quarter. */
-PTI_LOCK_INLINE void pti_lock_turn(pti_fw u, pti_fw *c, pti_fw *s)
+PTI_INLINE8 void pti_lock_turn(pti_fw u, pti_fw *c, pti_fw *s)
 {
     pti_fw x, y;
     int i;
@@ -10145,7 +10139,7 @@ PTI_LOCK_INLINE void pti_lock_turn(pti_fw u, pti_fw *c, pti_fw *s)
 
 /* How far along s->n the next ray starts, if it goes to w: 2 e off the surface, 8 e inside balls. A point of a wall that touches
    a ball can start no more than 3 e inside it: so pti_lock_balls tells them apart. */
-PTI_LOCK_INLINE pti_fw pti_lock_lift(const pti_lockstep *k, const pti_lock_surface *s, pti_w3 w)
+PTI_INLINE8 pti_fw pti_lock_lift(const pti_lockstep *k, const pti_lock_surface *s, pti_w3 w)
 {
     const pti_fw zero = pti_fw_set(0), along = pti_w3_dot(s->n, w);
     const pti_fw out = pti_fw_select(s->front, along, pti_fw_sub(zero, along));
@@ -10165,7 +10159,7 @@ PTI_INLINE pti_w3 pti_lit3(const pti_lockstep *k, int row, pti_uw light)
 
 /* A point of spheres: in the cone seen from p, or, from inside, in any direction. *q: the point, moved 2 e off to the side
    of p; *to: the direction that was drawn, which from 2 e inside the sphere is not that of q; density per solid angle. */
-PTI_LOCK_INLINE pti_fw pti_lock_ball_point(const pti_lockstep *k, pti_uw light, pti_w3 p, const pti_lock_numbers *u, pti_w3 *q, pti_w3 *to)
+PTI_INLINE8 pti_fw pti_lock_ball_point(const pti_lockstep *k, pti_uw light, pti_w3 p, const pti_lock_numbers *u, pti_w3 *q, pti_w3 *to)
 {
     const pti_fw zero = pti_fw_set(0), one = pti_fw_set(1), r = pti_lit(k, PTI_LIT_RADIUS, light);
     const pti_w3 centre = pti_lit3(k, PTI_LIT_P, light), c = pti_w3_sub(centre, p);
@@ -10187,7 +10181,7 @@ PTI_LOCK_INLINE pti_fw pti_lock_ball_point(const pti_lockstep *k, pti_uw light, 
 }
 
 /* A point of a flat light, moved 2 e off its front; density per area. */
-PTI_LOCK_INLINE pti_fw pti_lock_flat_point(const pti_lockstep *k, pti_uw light, const pti_lock_numbers *u, pti_w3 *q, pti_w3 *n)
+PTI_INLINE8 pti_fw pti_lock_flat_point(const pti_lockstep *k, pti_uw light, const pti_lock_numbers *u, pti_w3 *q, pti_w3 *n)
 {
     const pti_fw triangle = pti_lit(k, PTI_LIT_TRIANGLE, light), root = pti_fw_sqrt(u->light0);
     const pti_mw is_triangle = pti_fw_lt(pti_fw_set(0), triangle);
@@ -10201,7 +10195,7 @@ PTI_LOCK_INLINE pti_fw pti_lock_flat_point(const pti_lockstep *k, pti_uw light, 
 }
 
 /* Asks a point of a light for its light; how many rays that took. */
-PTI_LOCK_INLINE int pti_lock_direct(const pti_lockstep *k, const pti_lock_surface *s, pti_w3 albedo, pti_mw active, const pti_lock_numbers *u,
+PTI_INLINE8 int pti_lock_direct(const pti_lockstep *k, const pti_lock_surface *s, pti_w3 albedo, pti_mw active, const pti_lock_numbers *u,
                                pti_lane_row *row, pt_heuristic heuristic)
 {
     const pti_fw zero = pti_fw_set(0), inverse_pi = pti_fw_set((float)(1 / PT_PI));
@@ -10244,7 +10238,7 @@ PTI_LOCK_INLINE int pti_lock_direct(const pti_lockstep *k, const pti_lock_surfac
 }
 
 /* A direction about n by the cosine, as pt_warp_cosine has it; *z: the cosine. */
-PTI_LOCK_INLINE pti_w3 pti_lock_cosine(pti_w3 n, pti_fw u, pti_fw v, pti_fw *z)
+PTI_INLINE8 pti_w3 pti_lock_cosine(pti_w3 n, pti_fw u, pti_fw v, pti_fw *z)
 {
     const pti_fw two = pti_fw_set(2), shift = pti_fw_set((float)(PTI_2_M24 - 1)), one = pti_fw_set(1);
     const pti_fw a = pti_fw_madd(two, u, shift), b = pti_fw_madd(two, v, shift);
@@ -10262,7 +10256,7 @@ PTI_LOCK_INLINE pti_w3 pti_lock_cosine(pti_w3 n, pti_fw u, pti_fw v, pti_fw *z)
 /* Mirrors and glass: the next direction, and what beta is multiplied by. Glass that is left within 16 e of an edge does not
    bend: a face is wider than it is by rounding, and a ray that passes by could hit its back, be reflected into the glass
    at an angle that no refraction gives, and never get out. */
-PTI_LOCK_INLINE pti_w3 pti_lock_specular(const pti_lockstep *k, const pti_lock_surface *s, pti_w3 d, pti_fw u, pti_w3 *weight, pti_lane_row *row)
+PTI_INLINE8 pti_w3 pti_lock_specular(const pti_lockstep *k, const pti_lock_surface *s, pti_w3 d, pti_fw u, pti_w3 *weight, pti_lane_row *row)
 {
     const pti_fw one = pti_fw_set(1), zero = pti_fw_set(0), two_cosines = pti_fw_add(s->cosine, s->cosine);
     const pti_fw ior = pti_fw_gather(k->of[PTI_OF_IOR], s->i), eta = pti_fw_select(s->front, pti_fw_div(one, ior), ior);
@@ -10285,7 +10279,7 @@ PTI_LOCK_INLINE pti_w3 pti_lock_specular(const pti_lockstep *k, const pti_lock_s
 }
 
 /* Russian roulette, as pti_roulette; the lanes that go on. */
-PTI_LOCK_INLINE pti_mw pti_lock_roulette(const pt_li_options *options, pti_lane_row *row, pti_w3 *beta, pti_fw u)
+PTI_INLINE8 pti_mw pti_lock_roulette(const pt_li_options *options, pti_lane_row *row, pti_w3 *beta, pti_fw u)
 {
     const int constant = options->roulette == PT_ROULETTE_CONSTANT;
     const int start = options->roulette_start > 0 ? options->roulette_start : constant ? 1 : 3;
