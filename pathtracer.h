@@ -147,6 +147,7 @@
 
        [Arv90] Arvo, Kirk: Particle Transport and Image Synthesis, 1990
        [Arv95] Arvo: Stratified Sampling of Spherical Triangles, 1995
+       [Bla21] Blackman, Vigna: Scrambled Linear Pseudorandom Number Generators, ACM TOMS 47(4), 2021
        [Bur20] Burley: Practical Hash-based Owen Scrambling, JCGT 9(4), 2020
        [Che83] Chan, Golub, LeVeque: Algorithms for Computing the Sample Variance, 1983
        [Coo84] Cook, Porter, Carpenter: Distributed Ray Tracing, 1984
@@ -163,6 +164,7 @@
        [Kaj86] Kajiya: The Rendering Equation, 1986
        [Ken13] Kensler: Correlated Multi-Jittered Sampling, Pixar memo 13-01, 2013
        [Laf94] Lafortune, Willems: Using the Modified Phong Reflectance Model, 1994
+       [Lai13] Laine, Karras, Aila: Megakernels Considered Harmful: Wavefront Path Tracing on GPUs, HPG 2013
        [Lam60] Lambert: Photometria, 1760 (polygon irradiance; see Arvo, Applications of Irradiance
                Tensors, 1995)
        [Mat03] Matusik, Pfister, Brand, McMillan: A Data-Driven Reflectance Model, 2003
@@ -10016,7 +10018,7 @@ typedef struct pti_lock_surface {
     pti_uw i;
     pti_w3 p, n;            /* point, and normal on the side that the path came from                       */
     pti_fw cosine;          /* of the ray and that normal                                                  */
-    pti_mw met, front, ball, brim; /* anything at all; from the side of ng; a sphere; close to an edge     */
+    pti_mw met, front, ball; /* anything at all; from the side of ng; a sphere                             */
     pti_fw kind;
 } pti_lock_surface;
 
@@ -10036,16 +10038,16 @@ PTI_INLINE pti_w3 pti_gather3(const float (*table)[PTI_LOCK_MAX], int row, pti_u
 PTI_INLINE8 void pti_lock_land(const pti_lockstep *k, pti_w3 o, pti_w3 d, const pti_lock_best *best, pti_lock_surface *s)
 {
     const pti_fw zero = pti_fw_set(0), inset = pti_fw_set(16 * k->e);
+    const pti_mw brim = pti_fw_lt(best->margin, inset);
     pti_w3 n;
     s->i = pti_uw_from_floats(best->i);
     s->p = pti_w3_along(d, best->t, o);
     n = pti_gather3(k->of, PTI_OF_N, s->i);
     s->p = pti_w3_along(n, pti_fw_sub(zero, pti_w3_dot_add(n, s->p, pti_fw_gather(k->of[PTI_OF_D], s->i))), s->p);
-    s->brim = pti_fw_lt(best->margin, inset);
-    if (pti_mw_bits(s->brim)) {
+    if (pti_mw_bits(brim)) {
         const pti_fw depth = pti_fw_gather(k->of[PTI_OF_DEPTH], s->i);
         const pti_fw share = pti_fw_div(pti_fw_sub(inset, best->margin), pti_fw_sub(depth, best->margin));
-        s->p = pti_w3_along(pti_w3_sub(pti_gather3(k->of, PTI_OF_CENTRE, s->i), s->p), pti_fw_select(s->brim, share, zero), s->p);
+        s->p = pti_w3_along(pti_w3_sub(pti_gather3(k->of, PTI_OF_CENTRE, s->i), s->p), pti_fw_select(brim, share, zero), s->p);
     }
     s->ball = pti_fw_lt(pti_fw_set(1e38f), best->margin);
     if (pti_mw_bits(s->ball)) { /* n = 0 for spheres, so p is as it was */
@@ -10253,9 +10255,7 @@ PTI_INLINE8 pti_w3 pti_lock_cosine(pti_w3 n, pti_fw u, pti_fw v, pti_fw *z)
     return pti_w3_normalize(pti_w3_along(n, *z, pti_w3_along(t, pti_fw_mul(r, pti_fw_select(wide, sine, cosine)), s)));
 }
 
-/* Mirrors and glass: the next direction, and what beta is multiplied by. Glass that is left within 16 e of an edge does not
-   bend: a face is wider than it is by rounding, and a ray that passes by could hit its back, be reflected into the glass
-   at an angle that no refraction gives, and never get out. */
+/* Mirrors and glass: the next direction, and what beta is multiplied by. */
 PTI_INLINE8 pti_w3 pti_lock_specular(const pti_lockstep *k, const pti_lock_surface *s, pti_w3 d, pti_fw u, pti_w3 *weight, pti_lane_row *row)
 {
     const pti_fw one = pti_fw_set(1), zero = pti_fw_set(0), two_cosines = pti_fw_add(s->cosine, s->cosine);
@@ -10266,16 +10266,14 @@ PTI_INLINE8 pti_w3 pti_lock_specular(const pti_lockstep *k, const pti_lock_surfa
     const pti_fw rp = pti_fw_div(pti_fw_nmadd(eta, other, s->cosine), pti_fw_madd(eta, other, s->cosine));
     const pti_fw half = pti_fw_mul(pti_fw_set(0.5f), pti_fw_madd(rs, rs, pti_fw_mul(rp, rp)));
     const pti_fw fresnel = pti_fw_select(pti_fw_lt(sine2, one), half, one);
-    const pti_mw glass = pti_lock_is(s, PT_MATERIAL_DIELECTRIC), brim = pti_mw_and(glass, s->brim);
-    const pti_fw side = pti_fw_select(s->front, one, zero), bend = pti_fw_select(brim, side, one); /* 0: straight on */
-    const pti_mw bent = pti_mw_and(glass, pti_fw_le(fresnel, pti_fw_mul(u, bend)));
+    const pti_mw glass = pti_lock_is(s, PT_MATERIAL_DIELECTRIC), bent = pti_mw_and(glass, pti_fw_le(fresnel, u));
     const pti_fw eta2 = pti_fw_mul(eta, eta);
     const pti_w3 mirrored = pti_w3_along(s->n, two_cosines, d);
     const pti_w3 refracted = pti_w3_along(s->n, pti_fw_nmadd(other, one, pti_fw_mul(eta, s->cosine)), pti_w3_scale(d, eta));
     const pti_w3 grey = pti_w3_make(pti_fw_select(bent, eta2, one), pti_fw_select(bent, eta2, one), pti_fw_select(bent, eta2, one));
     *weight = pti_w3_select(glass, grey, *weight);
     row[PTI_ROW_ETA2].f = pti_fw_select(bent, pti_fw_div(row[PTI_ROW_ETA2].f, eta2), row[PTI_ROW_ETA2].f);
-    return pti_w3_normalize(pti_w3_select(pti_fw_lt(zero, bend), pti_w3_select(bent, refracted, mirrored), d));
+    return pti_w3_normalize(pti_w3_select(bent, refracted, mirrored));
 }
 
 /* Russian roulette, as pti_roulette; the lanes that go on. */
