@@ -9321,8 +9321,8 @@ PTI_FW(pti_fw, mul, _mm512_mul_ps(x, y))
 PTI_FW(pti_fw, div, _mm512_div_ps(x, y))
 PTI_FW(pti_fw, min, _mm512_min_ps(x, y))
 PTI_FW(pti_fw, max, _mm512_max_ps(x, y))
-PTI_FW(pti_mw, lt, _mm512_cmp_ps_mask(x, y, _CMP_LT_OQ))
-PTI_FW(pti_mw, le, _mm512_cmp_ps_mask(x, y, _CMP_LE_OQ))
+PTI_FW(pti_mw, lt, _mm512_cmplt_ps_mask(x, y))
+PTI_FW(pti_mw, le, _mm512_cmple_ps_mask(x, y))
 PTI_INLINE pti_fw pti_fw_sqrt(pti_fw x) { return _mm512_sqrt_ps(x); }
 PTI_INLINE pti_fw pti_fw_abs(pti_fw x) { return _mm512_abs_ps(x); }
 PTI_INLINE pti_fw pti_fw_set(float x) { return _mm512_set1_ps(x); }
