@@ -9478,11 +9478,9 @@ typedef union pti_lane_row {
 #if PTI_WIDTH == 16
 PTI_INLINE pti_fw pti_fw_from_words(pti_uw x) { return _mm512_cvtepi32_ps(x); }
 PTI_INLINE pti_uw pti_uw_from_floats(pti_fw x) { return _mm512_cvttps_epi32(x); }
-PTI_INLINE pti_fw pti_fw_gather(const float *table, pti_uw index) { return _mm512_i32gather_ps(index, table, 4); }
 #elif PTI_LANES == 2
 PTI_INLINE pti_fw pti_fw_from_words(pti_uw x) { return _mm256_cvtepi32_ps(x); }
 PTI_INLINE pti_uw pti_uw_from_floats(pti_fw x) { return _mm256_cvttps_epi32(x); }
-PTI_INLINE pti_fw pti_fw_gather(const float *table, pti_uw index) { return _mm256_i32gather_ps(table, index, 4); }
 #else
 PTI_INLINE pti_fw pti_fw_from_words(pti_uw x)
 {
@@ -9500,6 +9498,12 @@ PTI_INLINE pti_uw pti_uw_from_floats(pti_fw x)
     for (i = 0; i < PTI_WIDTH; i++) r.bits[i] = (uint32_t)(int32_t)r.v[i];
     return r.u;
 }
+#endif
+#if PTI_WIDTH == 16 && defined(__OPTIMIZE__) /* without it a macro of the compiler's, with warnings */
+PTI_INLINE pti_fw pti_fw_gather(const float *table, pti_uw index) { return _mm512_i32gather_ps(index, table, 4); }
+#elif PTI_WIDTH == 8 && PTI_LANES == 2
+PTI_INLINE pti_fw pti_fw_gather(const float *table, pti_uw index) { return _mm256_i32gather_ps(table, index, 4); }
+#else
 PTI_INLINE pti_fw pti_fw_gather(const float *table, pti_uw index)
 {
     pti_lane_row r;
