@@ -9679,10 +9679,18 @@ static int pti_lock_wedge(const pti_lock_item *a, const pti_lock_item *b, double
     return 0;
 }
 
-/* row: x, y, z, 1 of the distance of a point from the line through a along t, in the plane across n (unit). */
-static void pti_lock_row(float *row, pti_d3 n, pti_d3 t, pt_vec3 a)
+/* The mean of the corners, or the centre. */
+static pti_d3 pti_lock_middle(const pti_lock_item *q)
 {
-    const pti_d3 s = pti_d_normalize(pti_d_cross(n, t));
+    pti_d3 sum = pti_d_from(q->c[0]);
+    int i;
+    for (i = 1; i < q->corners; i++) sum = pti_d_add(sum, pti_d_from(q->c[i]));
+    return q->corners ? pti_d_scale(sum, 1.0 / q->corners) : sum;
+}
+
+/* row: x, y, z, 1 of the height of a point above the plane through a across s (unit). */
+static void pti_lock_row(float *row, pti_d3 s, pt_vec3 a)
+{
     row[0] = (float)s.x;
     row[1] = (float)s.y;
     row[2] = (float)s.z;
@@ -9693,24 +9701,19 @@ static void pti_lock_row(float *row, pti_d3 n, pti_d3 t, pt_vec3 a)
 static double pti_lock_write_flat(const pti_lock_item *q, float *at)
 {
     const int b = (q->kind + 1) % 3, c = (q->kind + 2) % 3;
-    const pti_d3 n = pti_lock_normal(q);
+    const pti_d3 n = pti_lock_normal(q), middle = pti_lock_middle(q);
     double depth = HUGE_VAL;
-    pti_d3 middle = pti_d(0, 0, 0);
     int i, k;
-    for (i = 0; i < q->corners; i++) middle = pti_d_add(middle, pti_d_scale(pti_d_from(q->c[i]), 1.0 / q->corners));
     for (i = 0; i < q->corners; i++) {
-        const pti_d3 t = pti_d_between(q->c[i], q->c[(i + 1) % q->corners]);
-        const double d = pti_d_dot(pti_d_normalize(pti_d_cross(n, t)), pti_d_sub(middle, pti_d_from(q->c[i])));
+        const pti_d3 inwards = pti_d_normalize(pti_d_cross(n, pti_d_between(q->c[i], q->c[(i + 1) % q->corners])));
+        const double d = pti_d_dot(inwards, pti_d_sub(middle, pti_d_from(q->c[i])));
         depth = fmin(depth, d);
         if (q->kind == PTI_LOCK_QUADS && i != 0 && i != 3) continue;
-        if (q->kind >= PTI_LOCK_QUADS) pti_lock_row(at + (i == 0 ? 4 : q->corners == 4 ? 8 : 4 + 4 * i), n, t, q->c[i]);
+        if (q->kind >= PTI_LOCK_QUADS) pti_lock_row(at + (i == 0 ? 4 : q->corners == 4 ? 8 : 4 + 4 * i), inwards, q->c[i]);
         if (q->kind == PTI_LOCK_QUADS) at[i == 0 ? 12 : 13] = (float)(2 * d);
     }
     if (q->kind >= PTI_LOCK_QUADS) {
-        at[0] = (float)n.x;
-        at[1] = (float)n.y;
-        at[2] = (float)n.z;
-        at[3] = (float)-pti_d_dot(n, pti_d_from(q->c[0]));
+        pti_lock_row(at, n, q->c[0]);
         return depth;
     }
     at[0] = (float)pti_along(&q->c[0], q->kind);
@@ -9759,13 +9762,11 @@ static void pti_lock_write_light(pti_lockstep *k, const pt_scene *scene, const p
 static double pti_lock_write(pti_lockstep *k, const pt_scene *scene, const pti_lock_item *q, int i, double *sum)
 {
     const pt_material *m = &scene->materials[q->material];
-    pti_d3 n = pti_d(0, 0, 0), middle = pti_d_from(q->c[0]);
+    pti_d3 n = pti_d(0, 0, 0);
     double depth = q->radius;
     if (q->corners) {
         n = pti_lock_normal(q);
         depth = pti_lock_write_flat(q, k->at[i]);
-        middle = pti_d_scale(pti_d_add(middle, pti_d_from(q->c[2])), 0.5);
-        if (q->corners == 3) middle = pti_d_scale(pti_d_add(pti_d_from(q->c[0]), pti_d_add(pti_d_from(q->c[1]), pti_d_from(q->c[2]))), 1 / 3.0);
     } else {
         k->at[i][0] = (float)q->c[0].x;
         k->at[i][1] = (float)q->c[0].y;
@@ -9774,7 +9775,7 @@ static double pti_lock_write(pti_lockstep *k, const pt_scene *scene, const pti_l
     }
     pti_lock_put(k->of, PTI_OF_N, i, n);
     k->of[PTI_OF_D][i] = (float)-pti_d_dot(n, pti_d_from(q->c[0]));
-    pti_lock_put(k->of, PTI_OF_CENTRE, i, middle);
+    pti_lock_put(k->of, PTI_OF_CENTRE, i, pti_lock_middle(q));
     k->of[PTI_OF_DEPTH][i] = (float)depth;
     k->of[PTI_OF_RADIUS][i] = (float)q->radius;
     pti_lock_put(k->of, PTI_OF_ALBEDO, i, pti_d((double)m->albedo.r, (double)m->albedo.g, (double)m->albedo.b));
@@ -10153,6 +10154,13 @@ PTI_INLINE8 pti_fw pti_lock_lift(const pti_lockstep *k, const pti_lock_surface *
     return pti_fw_select(pti_fw_lt(along, zero), pti_fw_sub(zero, far), far);
 }
 
+PTI_INLINE int pti_count_bits(unsigned x)
+{
+    int n = 0;
+    for (; x; x &= x - 1) n++;
+    return n;
+}
+
 /* What is known of the lights chosen; one light is the same for all lanes. */
 PTI_INLINE pti_fw pti_lit(const pti_lockstep *k, int row, pti_uw light)
 {
@@ -10211,7 +10219,7 @@ PTI_INLINE8 int pti_lock_direct(const pti_lockstep *k, const pti_lock_surface *s
     pti_mw flat = pti_mw_of_bits(~0u);
     pti_lock_best end;
     pti_uw light;
-    int i, rays = 0;
+    int i, rays;
     for (i = 1; i < k->light_count; i++) number = pti_fw_select(pti_fw_le(pti_fw_set(k->chosen[i]), u->which), pti_fw_set((float)i), number);
     light = pti_uw_from_floats(number);
     density = pti_lock_flat_point(k, light, u, &q, &n);
@@ -10230,7 +10238,7 @@ PTI_INLINE8 int pti_lock_direct(const pti_lockstep *k, const pti_lock_surface *s
     there = pti_fw_sub(zero, pti_w3_dot(n, w));
     p = pti_fw_select(flat, pti_fw_div(pti_fw_mul(density, distance2), there), density);
     active = pti_mw_and(active, pti_mw_and(pti_fw_lt(zero, here), pti_fw_lt(zero, p)));
-    for (i = (int)pti_mw_bits(active); i; i &= i - 1) rays++;
+    rays = pti_count_bits(pti_mw_bits(active));
     if (rays == 0) return 0;
     end.t = distance;
     end.i = end.margin = end.key = zero;
@@ -10293,13 +10301,6 @@ PTI_INLINE8 pti_mw pti_lock_roulette(const pt_li_options *options, pti_lane_row 
     q = pti_fw_select(due, q, pti_fw_set(1));
     *beta = pti_w3_scale(*beta, pti_fw_div(pti_fw_set(1), q));
     return pti_fw_lt(u, q);
-}
-
-PTI_INLINE int pti_count_bits(unsigned x)
-{
-    int n = 0;
-    for (; x; x &= x - 1) n++;
-    return n;
 }
 
 /* What all walks of a task share, and those under way. */

@@ -8,6 +8,7 @@
 #define LOCK_MAIN 1
 #endif
 #include "pt_lock.h"
+#include "pt_floats.h"
 
 #if PTI_HAS_LOCKSTEP
 
@@ -491,32 +492,20 @@ static void words(void)
     for (k = 0; k < 12; k++) pt_check(wrong[k] == 0, label("words of lanes, %s", names[k]), "%d lanes differ from C", wrong[k]);
 }
 
-static int same_float(float a, float b) { return memcmp(&a, &b, sizeof a) == 0 || (a != a && b != b); }
-
-/* Numbers that are likely to meet where it hurts. */
-static float odd_float(pt_pcg32 *rng)
-{
-    static const float odd[12] = {0, -0.0f, 1, -1, 1e-38f, -1e-44f, 3.4e38f, -3.4e38f, HUGE_VALF, -HUGE_VALF, 1.5f, 0.1f};
-    const unsigned k = pt_pcg32_next(rng) % 24;
-    if (k < 12) return odd[k];
-    if (k == 12) return HUGE_VALF - HUGE_VALF;
-    return (float)(between(rng, -1, 1) * pow(2, between(rng, -30, 30)));
-}
-
 static void floats(void)
 {
     static const char *const names[14] = {"add", "sub", "mul", "div", "min", "max", "sqrt", "abs", "select", "lt", "le", "madd", "nmadd", "words and tables"};
     pt_pcg32 rng = pt_pcg32_make(pt_test_seed(2), 2);
     float table[64];
     int wrong[14] = {0}, i, k;
-    for (k = 0; k < 64; k++) table[k] = odd_float(&rng);
+    for (k = 0; k < 64; k++) table[k] = hostile_float(&rng);
     for (i = 0; i < (int)pt_test_samples(20000); i++) {
         pti_lane_row x, y, z, w, r[11], from, to, got;
         unsigned less, at_most;
         for (k = 0; k < PTI_WIDTH; k++) {
-            x.v[k] = odd_float(&rng);
-            y.v[k] = pt_pcg32_next(&rng) % 4 ? odd_float(&rng) : x.v[k];
-            z.v[k] = odd_float(&rng);
+            x.v[k] = hostile_float(&rng);
+            y.v[k] = pt_pcg32_next(&rng) % 4 ? hostile_float(&rng) : x.v[k];
+            z.v[k] = hostile_float(&rng);
             w.bits[k] = pt_pcg32_next(&rng) >> 8;
         }
         r[0].f = pti_fw_add(x.f, y.f);
@@ -1291,21 +1280,19 @@ static void refused(void)
 }
 
 /* The auxiliary pictures are those of the same camera rays, one at a time; to ask for them changes no bit of the picture. */
-static void layers(void)
+static void layers_of(int kind)
 {
-    stage s = room(SPHERES);
-    pt_render_desc d;
+    stage s = room(kind);
+    pt_render_desc d = desc_of(&s, 40, 30, 8);
     pt_film film, plain, without;
     int i, same, hits = 0, off = 0;
-    commit(&s);
-    d = desc_of(&s, 40, 30, 8);
     without = render(&s, &d, 1, NULL);
     d.aov = 1;
     film = render(&s, &d, 1, NULL);
     d.no_lockstep = 1;
     plain = render(&s, &d, 0, NULL);
     same = memcmp(film.half[0], without.half[0], 3600 * sizeof(double)) == 0 && memcmp(film.half[1], without.half[1], 3600 * sizeof(double)) == 0;
-    pt_check(same, "auxiliary pictures", "asking for them changes the picture");
+    pt_check(same, label("auxiliary pictures, %s", room_names[kind]), "asking for them changes the picture");
     for (i = 0; i < 1200; i++) {
         int k, wrong = fabs(film.depth[i] - plain.depth[i]) > 1e-5 * plain.depth[i];
         for (k = 3 * i; k < 3 * i + 3; k++) wrong |= fabs(film.albedo[k] - plain.albedo[k]) > 1e-5 || fabs(film.normal[k] - plain.normal[k]) > 1e-4;
@@ -1313,11 +1300,18 @@ static void layers(void)
         hits += plain.depth[i] > 0;
     }
     /* a ray at the rim of a ball turns its normal by the root of its rounding */
-    pt_check(hits > 600 && off <= 12, "auxiliary pictures", "%d of %d pixels differ from those of paths one at a time", off, hits);
+    pt_check(hits > 600 && off <= 12, label("auxiliary pictures, %s", room_names[kind]),
+             "%d of %d pixels differ from those of paths one at a time", off, hits);
     pt_film_free(&film);
     pt_film_free(&plain);
     pt_film_free(&without);
     pt_scene_free(&s.scene);
+}
+
+static void layers(void)
+{
+    layers_of(SPHERES);
+    layers_of(IN_GLASS); /* seen from behind */
 }
 
 /* Just inside of what it takes. */

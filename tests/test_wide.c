@@ -39,6 +39,7 @@ static void put_memory(void *p)
 #include "pt_test.h"
 
 #if PTI_HAS_WIDE
+#include "pt_floats.h"
 
 static double between(pt_pcg32 *rng, double low, double high) { return low + (high - low) * pt_pcg32_double(rng); }
 
@@ -52,18 +53,6 @@ static pt_vec3 in_cube(pt_pcg32 *rng, double half)
 
 /* ---- lanes ------------------------------------------------------------------------------------------------ */
 
-static int same_float(float a, float b) { return memcmp(&a, &b, sizeof a) == 0 || (a - a != 0 && b - b != 0 && !(a < b) && !(b < a)); }
-
-/* Numbers that are likely to meet where it hurts. */
-static float hostile(pt_pcg32 *rng)
-{
-    static const float odd[12] = {0, -0.0f, 1, -1, 1e-38f, -1e-44f, 3.4e38f, -3.4e38f, HUGE_VALF, -HUGE_VALF, 1.5f, 0.1f};
-    const unsigned k = pt_pcg32_next(rng) % 24;
-    if (k < 12) return odd[k];
-    if (k == 12) return HUGE_VALF - HUGE_VALF;
-    return (float)(between(rng, -1, 1) * pow(2, between(rng, -30, 30)));
-}
-
 static void lanes(void)
 {
     pt_pcg32 rng = pt_pcg32_make(pt_test_seed(1), 1);
@@ -72,9 +61,9 @@ static void lanes(void)
         pti_lanes x, y, z, r[13];
         unsigned less, at_most;
         for (k = 0; k < 8; k++) {
-            x.v[k] = hostile(&rng);
-            y.v[k] = pt_pcg32_next(&rng) % 4 ? hostile(&rng) : x.v[k];
-            z.v[k] = hostile(&rng);
+            x.v[k] = hostile_float(&rng);
+            y.v[k] = pt_pcg32_next(&rng) % 4 ? hostile_float(&rng) : x.v[k];
+            z.v[k] = hostile_float(&rng);
         }
         r[0].f = pti_f8_add(x.f, y.f);
         r[1].f = pti_f8_sub(x.f, y.f);
