@@ -9570,7 +9570,8 @@ enum {
     PTI_OF_N, PTI_OF_D = 3,         /* flat: the plane n.p + d = 0 */
     PTI_OF_CENTRE = 4, PTI_OF_DEPTH = 7, /* centroid and its distance to the nearest edge; centre of a sphere */
     PTI_OF_RADIUS = 8,              /* 0: flat */
-    PTI_OF_ALBEDO = 9, PTI_OF_KIND = 12, PTI_OF_IOR = 13, PTI_OF_LIGHT = 14, PTI_OF_COUNT = 15
+    PTI_OF_ALBEDO = 9, PTI_OF_KIND = 12, PTI_OF_IOR = 13, PTI_OF_LIGHT = 14,
+    PTI_OF_ALPHA = 15, PTI_OF_ETA = 16, PTI_OF_K = 19, PTI_OF_COUNT = 22 /* of metal; alpha 0: smooth       */
 };
 enum {
     PTI_LIT_P, PTI_LIT_E1 = 3, PTI_LIT_E2 = 6, PTI_LIT_N = 9, /* corner, edges, normal; centre of a sphere   */
@@ -9586,7 +9587,7 @@ typedef struct pti_lockstep {
                                        x, y, z, 1 of the height above the plane and of the distances from edges: two, and
                                        the distances of the opposite edges, or three. Sphere: centre, radius        */
     float of[PTI_OF_COUNT][PTI_LOCK_MAX], light[PTI_LIT_COUNT][PTI_LOCK_MAX], chosen[PTI_LOCK_MAX];
-    int light_count, sphere_lights, specular; /* specular: some material is                                 */
+    int light_count, sphere_lights, specular, metal, rough; /* specular: something is not diffuse; some metal; some rough one */
     float e, e_camera;              /* how far a computed point may be off its plane; the same for rays of the camera */
 } pti_lockstep;
 
@@ -9758,7 +9759,7 @@ static void pti_lock_write_light(pti_lockstep *k, const pt_scene *scene, const p
     k->sphere_lights += q->corners == 0;
 }
 
-/* Writes item q as number i; returns its smallest measure. */
+/* Writes item q as number i; returns its smallest measure: from the middle to an edge, across a ball. */
 static double pti_lock_write(pti_lockstep *k, const pt_scene *scene, const pti_lock_item *q, int i, double *sum)
 {
     const pt_material *m = &scene->materials[q->material];
@@ -9783,11 +9784,27 @@ static double pti_lock_write(pti_lockstep *k, const pt_scene *scene, const pti_l
     k->of[PTI_OF_IOR][i] = (float)pti_ior(m);
     k->of[PTI_OF_LIGHT][i] = -1;
     k->specular |= m->kind != PT_MATERIAL_DIFFUSE;
+    if (m->kind == PT_MATERIAL_CONDUCTOR) {
+        k->of[PTI_OF_ALPHA][i] = pti_is_smooth(m) ? 0 : (float)m->roughness * (float)m->roughness;
+        pti_lock_put(k->of, PTI_OF_ETA, i, pti_d((double)m->eta.r, (double)m->eta.g, (double)m->eta.b));
+        pti_lock_put(k->of, PTI_OF_K, i, pti_d((double)m->k.r, (double)m->k.g, (double)m->k.b));
+        k->metal = 1;
+        k->rough |= !pti_is_smooth(m);
+    }
     if (q->light >= 0) {
         k->of[PTI_OF_LIGHT][i] = (float)k->light_count;
         pti_lock_write_light(k, scene, q, n, sum);
     }
-    return depth;
+    return q->corners ? depth : 2 * depth;
+}
+
+/* Rough metal: the density of GGX facets at a half vector that is off by 3 u is off by 6 u / alpha of itself at most, where
+   u = 2^-24: 7e-4 from the alpha on that is taken. The squares of eta and k have room in a float. */
+static int pti_lock_takes(const pt_material *m)
+{
+    const double most = fmax(pti_max3((double)m->eta.r, (double)m->eta.g, (double)m->eta.b), pti_max3((double)m->k.r, (double)m->k.g, (double)m->k.b));
+    if (m->kind == PT_MATERIAL_DIELECTRIC) return pti_is_smooth(m);
+    return m->kind != PT_MATERIAL_CONDUCTOR || (most < 1e6 && (pti_is_smooth(m) || (double)m->roughness * (double)m->roughness >= 1 / 2048.));
 }
 
 /* Makes a scene ready; 0: it is not one for lanes, or not seen from such a place. With u = 2^-24 and all coordinates at
@@ -9797,7 +9814,7 @@ static double pti_lock_write(pti_lockstep *k, const pt_scene *scene, const pti_l
 static int pti_lockstep_make(pti_lockstep *k, const pt_scene *scene, pt_vec3 eye)
 {
     const unsigned taken = PT_NEEDS_TRIANGLES | PT_NEEDS_PARALLELOGRAMS | PT_NEEDS_SPHERES | PT_NEEDS_DIFFUSE | PT_NEEDS_MIRROR |
-                           PT_NEEDS_DIELECTRIC | PT_NEEDS_UVS | PT_NEEDS_AREA_LIGHTS | PT_NEEDS_BVH;
+                           PT_NEEDS_DIELECTRIC | PT_NEEDS_CONDUCTOR | PT_NEEDS_ROUGHNESS | PT_NEEDS_UVS | PT_NEEDS_AREA_LIGHTS | PT_NEEDS_BVH;
     const double x = fmax(pti_max3((double)scene->lo.x, (double)scene->lo.y, (double)scene->lo.z),
                           pti_max3((double)scene->hi.x, (double)scene->hi.y, (double)scene->hi.z));
     const double from = fmax(x, pti_max3((double)eye.x, (double)eye.y, (double)eye.z));
@@ -9811,6 +9828,7 @@ static int pti_lockstep_make(pti_lockstep *k, const pt_scene *scene, pt_vec3 eye
     k->e_camera = (float)(17 * PTI_2_M24 * from);
     for (i = 0; i < scene->primitive_count; count++) i += pti_lock_collect(scene, i, x, &items[count]);
     for (j = 0; j < count; j++) {
+        if (!pti_lock_takes(&scene->materials[items[j].material])) return 0;
         items[j].blocks = pti_lock_blocks(&items[j], items, count, (double)k->e);
         for (kind = 0; kind < j; kind++)
             if (pti_lock_wedge(&items[j], &items[kind], 4 * (double)k->e)) return 0;
@@ -10161,6 +10179,96 @@ PTI_INLINE int pti_count_bits(unsigned x)
     return n;
 }
 
+/* pt_fresnel_conductor in lanes. */
+PTI_INLINE8 pti_fw pti_lock_fresnel(pti_fw c, pti_fw eta, pti_fw k)
+{
+    const pti_fw zero = pti_fw_set(0), one = pti_fw_set(1), half = pti_fw_set(0.5f), c2 = pti_fw_mul(c, c);
+    const pti_fw s2 = pti_fw_mul(pti_fw_sub(one, c), pti_fw_add(one, c)), m = pti_fw_mul(pti_fw_add(eta, eta), k);
+    const pti_fw t = pti_fw_sub(pti_fw_mul(pti_fw_sub(eta, k), pti_fw_add(eta, k)), s2), ab = pti_fw_sqrt(pti_fw_madd(t, t, pti_fw_mul(m, m)));
+    const pti_fw below = pti_fw_mul(half, pti_fw_div(pti_fw_mul(m, m), pti_fw_sub(ab, t))), above = pti_fw_mul(half, pti_fw_add(ab, t));
+    const pti_fw a = pti_fw_sqrt(pti_fw_select(pti_fw_lt(t, zero), below, above)), ac = pti_fw_mul(pti_fw_add(a, a), c);
+    const pti_fw x = pti_fw_add(ab, c2), y = pti_fw_madd(ab, c2, pti_fw_mul(s2, s2)), z = pti_fw_mul(ac, s2);
+    const pti_fw rs = pti_fw_div(pti_fw_sub(x, ac), pti_fw_add(x, ac)), rp = pti_fw_mul(rs, pti_fw_div(pti_fw_sub(y, z), pti_fw_add(y, z)));
+    return pti_fw_select(pti_fw_lt(zero, ab), pti_fw_mul(half, pti_fw_add(rs, rp)), one);
+}
+
+/* What metal reflects under the cosine c. */
+PTI_INLINE8 pti_w3 pti_lock_metal(const pti_lockstep *k, pti_uw i, pti_fw c)
+{
+    const pti_w3 eta = pti_gather3(k->of, PTI_OF_ETA, i), kappa = pti_gather3(k->of, PTI_OF_K, i);
+    return pti_w3_make(pti_lock_fresnel(c, eta.x, kappa.x), pti_lock_fresnel(c, eta.y, kappa.y), pti_lock_fresnel(c, eta.z, kappa.z));
+}
+
+/* GGX facets: a frame with the normal, the direction back in it, alpha and its reciprocal. */
+typedef struct pti_lock_facets {
+    pti_w3 s, t, o;
+    pti_fw alpha, inverse;
+    pti_mw rough;           /* lanes on them; the others have an alpha of 1                                 */
+} pti_lock_facets;
+
+PTI_INLINE8 void pti_lock_find_facets(const pti_lockstep *k, const pti_lock_surface *s, pti_w3 d, pti_lock_facets *f)
+{
+    const pti_fw zero = pti_fw_set(0), alpha = pti_fw_gather(k->of[PTI_OF_ALPHA], s->i);
+    f->rough = pti_fw_lt(zero, alpha);
+    f->alpha = pti_fw_select(f->rough, alpha, pti_fw_set(1));
+    f->inverse = pti_fw_div(pti_fw_set(1), f->alpha);
+    pti_lock_frame(s->n, &f->s, &f->t);
+    f->o = pti_w3_make(pti_fw_sub(zero, pti_w3_dot(d, f->s)), pti_fw_sub(zero, pti_w3_dot(d, f->t)), s->cosine);
+}
+
+/* cos (1 + Lambda) of a direction above the facets, with tan^2 written without its denominator: (z + sqrt(z^2 + a^2 sin^2)) / 2. */
+PTI_INLINE8 pti_fw pti_lock_masked_cosine(const pti_lock_facets *f, pti_w3 w)
+{
+    const pti_fw q = pti_fw_mul(pti_fw_mul(f->alpha, f->alpha), pti_fw_madd(w.x, w.x, pti_fw_mul(w.y, w.y)));
+    return pti_fw_mul(pti_fw_set(0.5f), pti_fw_add(w.z, pti_fw_sqrt(pti_fw_madd(w.z, w.z, q))));
+}
+
+/* The density of the direction that half vector h reflects into: D G1 (o.h) / cos / (4 o.h), see [PT-04]. */
+PTI_INLINE8 pti_fw pti_lock_facet_density(const pti_lock_facets *f, pti_w3 h, pti_fw masked_o)
+{
+    const pti_fw r2 = pti_fw_madd(h.x, h.x, pti_fw_mul(h.y, h.y)), kd = pti_fw_madd(f->alpha, pti_fw_mul(h.z, h.z), pti_fw_mul(r2, f->inverse));
+    return pti_fw_div(pti_fw_set((float)(0.25 / PT_PI)), pti_fw_mul(pti_fw_mul(kd, kd), masked_o));
+}
+
+/* G2 / G1 = (1 + Lambda(o)) / (1 + Lambda(o) + Lambda(i)), with both cosines multiplied in; 0 for i at the horizon. */
+PTI_INLINE8 pti_fw pti_lock_shadowing(const pti_lock_facets *f, pti_w3 i, pti_fw masked_o)
+{
+    const pti_fw above = pti_fw_mul(masked_o, i.z), masked_i = pti_lock_masked_cosine(f, i);
+    return pti_fw_div(above, pti_fw_madd(f->o.z, pti_fw_sub(masked_i, i.z), above));
+}
+
+/* BRDF times cosine, but for the albedo, into i (of the frame, above); *density of i. */
+PTI_INLINE8 pti_w3 pti_lock_reflect(const pti_lockstep *k, const pti_lock_surface *s, const pti_lock_facets *f, pti_w3 i, pti_fw *density)
+{
+    const pti_w3 h = pti_w3_normalize(pti_w3_along(f->o, pti_fw_set(1), i));
+    const pti_fw masked_o = pti_lock_masked_cosine(f, f->o);
+    *density = pti_lock_facet_density(f, h, masked_o);
+    return pti_w3_scale(pti_lock_metal(k, s->i, pti_w3_dot(f->o, h)), pti_fw_mul(*density, pti_lock_shadowing(f, i, masked_o)));
+}
+
+/* A direction by a visible normal, as pti_ggx_visible_draw; its density, and weight multiplied. *above: it is. */
+PTI_INLINE8 pti_w3 pti_lock_glossy(const pti_lockstep *k, const pti_lock_surface *s, const pti_lock_facets *f, pti_fw u0, pti_fw u1, pti_fw *density,
+                                  pti_w3 *weight, pti_mw *above)
+{
+    const pti_fw zero = pti_fw_set(0), one = pti_fw_set(1), masked_o = pti_lock_masked_cosine(f, f->o);
+    const pti_w3 o = pti_w3_normalize(pti_w3_make(pti_fw_mul(f->alpha, f->o.x), pti_fw_mul(f->alpha, f->o.y), f->o.z));
+    const pti_fw top = pti_fw_add(one, o.z), rise = pti_fw_mul(pti_fw_sub(one, u1), top); /* z + o.z of the point of the cap */
+    const pti_fw low = pti_fw_div(pti_fw_madd(o.x, o.x, pti_fw_mul(o.y, o.y)), top);      /* 1 - o.z, with all its digits   */
+    const pti_fw r = pti_fw_sqrt(pti_fw_mul(pti_fw_mul(u1, top), pti_fw_add(rise, low)));  /* of (1 - z) (1 + z)             */
+    pti_fw cosine, sinus, c;
+    pti_w3 h, i, next;
+    pti_lock_turn(u0, &cosine, &sinus);
+    h = pti_w3_make(pti_fw_mul(f->alpha, pti_fw_madd(r, cosine, o.x)), pti_fw_mul(f->alpha, pti_fw_madd(r, sinus, o.y)), rise);
+    h = pti_w3_normalize(h);
+    c = pti_w3_dot(f->o, h);
+    i = pti_w3_sub(pti_w3_scale(h, pti_fw_add(c, c)), f->o);
+    *above = pti_mw_and(pti_fw_lt(zero, c), pti_fw_lt(zero, i.z));
+    *density = pti_lock_facet_density(f, h, masked_o);
+    *weight = pti_w3_mul(*weight, pti_w3_scale(pti_lock_metal(k, s->i, c), pti_lock_shadowing(f, i, masked_o)));
+    next = pti_w3_along(f->s, i.x, pti_w3_along(f->t, i.y, pti_w3_scale(s->n, i.z)));
+    return pti_w3_normalize(next);
+}
+
 /* What is known of the lights chosen; one light is the same for all lanes. */
 PTI_INLINE pti_fw pti_lit(const pti_lockstep *k, int row, pti_uw light)
 {
@@ -10208,14 +10316,14 @@ PTI_INLINE8 pti_fw pti_lock_flat_point(const pti_lockstep *k, pti_uw light, cons
     return pti_lit(k, PTI_LIT_DENSITY, light);
 }
 
-/* Asks a point of a light for its light; how many rays that took. */
-PTI_INLINE8 int pti_lock_direct(const pti_lockstep *k, const pti_lock_surface *s, pti_w3 albedo, pti_mw active, const pti_lock_numbers *u,
-                               pti_lane_row *row, pt_heuristic heuristic)
+/* Asks a point of a light for its light; how many rays that took. f: NULL where nothing is rough. */
+PTI_INLINE8 int pti_lock_direct(const pti_lockstep *k, const pti_lock_surface *s, const pti_lock_facets *f, pti_w3 albedo, pti_mw active,
+                               const pti_lock_numbers *u, pti_lane_row *row, pt_heuristic heuristic)
 {
-    const pti_fw zero = pti_fw_set(0), inverse_pi = pti_fw_set((float)(1 / PT_PI));
+    const pti_fw zero = pti_fw_set(0);
     const pti_w3 o = pti_w3_along(s->n, pti_lock_lift(k, s, s->n), s->p);
-    pti_fw number = zero, density, distance2, distance, here, there, p, weight;
-    pti_w3 q, n, w, to;
+    pti_fw number = zero, density, distance2, distance, here, there, p, other, weight;
+    pti_w3 q, n, w, to, value;
     pti_mw flat = pti_mw_of_bits(~0u);
     pti_lock_best end;
     pti_uw light;
@@ -10242,12 +10350,20 @@ PTI_INLINE8 int pti_lock_direct(const pti_lockstep *k, const pti_lock_surface *s
     if (rays == 0) return 0;
     end.t = distance;
     end.i = end.margin = end.key = zero;
-    weight = pti_fw_div(pti_fw_mul(here, inverse_pi), p);
-    weight = pti_fw_mul(weight, pti_lock_weight(p, pti_fw_mul(here, inverse_pi), heuristic));
+    other = pti_fw_mul(here, pti_fw_set((float)(1 / PT_PI)));
+    value = pti_w3_scale(albedo, other);
+    if (f && pti_mw_bits(f->rough)) {
+        pti_fw of_facets;
+        const pti_w3 reflected = pti_lock_reflect(k, s, f, pti_w3_make(pti_w3_dot(w, f->s), pti_w3_dot(w, f->t), here), &of_facets);
+        const pti_mw some = pti_mw_and(f->rough, active); /* elsewhere there may be no number */
+        value = pti_w3_select(some, pti_w3_mul(albedo, reflected), value);
+        other = pti_fw_select(some, of_facets, other);
+    }
+    weight = pti_fw_div(pti_lock_weight(p, other, heuristic), p);
     weight = pti_fw_select(pti_lock_ask(k, o, w, k->e, &end, PTI_LOCK_ANY), zero, weight);
     weight = pti_fw_select(active, weight, zero);
-    albedo = pti_w3_mul(albedo, pti_w3_mul(pti_row3(row + PTI_ROW_BETA), pti_lit3(k, PTI_LIT_EMISSION, light)));
-    pti_row3_set(row + PTI_ROW_SUM, pti_w3_along(albedo, weight, pti_row3(row + PTI_ROW_SUM)));
+    value = pti_w3_mul(value, pti_w3_mul(pti_row3(row + PTI_ROW_BETA), pti_lit3(k, PTI_LIT_EMISSION, light)));
+    pti_row3_set(row + PTI_ROW_SUM, pti_w3_along(value, weight, pti_row3(row + PTI_ROW_SUM)));
     return rays;
 }
 
@@ -10283,9 +10399,34 @@ PTI_INLINE8 pti_w3 pti_lock_specular(const pti_lockstep *k, const pti_lock_surfa
     const pti_w3 mirrored = pti_w3_along(s->n, two_cosines, d);
     const pti_w3 refracted = pti_w3_along(s->n, pti_fw_nmadd(other, one, pti_fw_mul(eta, s->cosine)), pti_w3_scale(d, eta));
     const pti_w3 grey = pti_w3_make(pti_fw_select(bent, eta2, one), pti_fw_select(bent, eta2, one), pti_fw_select(bent, eta2, one));
+    if (k->metal) *weight = pti_w3_select(pti_lock_is(s, PT_MATERIAL_CONDUCTOR), pti_w3_mul(*weight, pti_lock_metal(k, s->i, s->cosine)), *weight);
     *weight = pti_w3_select(glass, grey, *weight);
     row[PTI_ROW_ETA2].f = pti_fw_select(bent, pti_fw_div(row[PTI_ROW_ETA2].f, eta2), row[PTI_ROW_ETA2].f);
     return pti_w3_normalize(pti_w3_select(bent, refracted, mirrored));
+}
+
+/* The next direction of every lane, its density (-1 of delta lobes), and weight multiplied; lanes of *go that it ends leave it. */
+PTI_INLINE8 pti_w3 pti_lock_scatter(const pti_lockstep *k, const pti_lock_surface *s, const pti_lock_facets *f, pti_w3 d, const pti_lock_numbers *u,
+                                   pti_w3 *weight, pti_fw *density, pti_lane_row *row, pti_mw *go)
+{
+    const pti_mw all = pti_mw_of_bits(~0u), diffuse = k->specular ? pti_lock_is(s, PT_MATERIAL_DIFFUSE) : all;
+    pti_fw cosine;
+    pti_w3 next = pti_lock_cosine(s->n, u->bsdf0, u->bsdf1, &cosine);
+    *density = pti_fw_mul(cosine, pti_fw_set((float)(1 / PT_PI)));
+    if (k->specular && pti_mw_bits(diffuse) != pti_mw_bits(all)) {
+        pti_w3 before = *weight;
+        next = pti_w3_select(diffuse, next, pti_lock_specular(k, s, d, u->lobe, weight, row));
+        *density = pti_fw_select(diffuse, *density, pti_fw_set(-1));
+        if (f && pti_mw_bits(f->rough)) {
+            pti_fw of_facets;
+            pti_mw above;
+            next = pti_w3_select(f->rough, pti_lock_glossy(k, s, f, u->bsdf0, u->bsdf1, &of_facets, &before, &above), next);
+            *weight = pti_w3_select(f->rough, before, *weight);
+            *density = pti_fw_select(f->rough, of_facets, *density);
+            *go = pti_mw_and(*go, pti_mw_or(above, pti_fw_le(pti_fw_gather(k->of[PTI_OF_ALPHA], s->i), pti_fw_set(0))));
+        }
+    }
+    return next;
 }
 
 /* Russian roulette, as pti_roulette; the lanes that go on. */
@@ -10337,9 +10478,11 @@ static unsigned pti_lock_vertex(pti_lock_work *w, pti_lane_row *row, unsigned ac
     const pti_w3 o = pti_row3(row + PTI_ROW_O), d = pti_row3(row + PTI_ROW_D);
     const pti_fw zero = pti_fw_set(0);
     pti_lock_surface s;
+    pti_lock_facets f;
+    const pti_lock_facets *facets = NULL;
     pti_lock_best best;
     pti_w3 weight, beta, next;
-    pti_fw cosine, density;
+    pti_fw density;
     pti_mw go;
     pti_lock_nearest(k, o, d, first ? k->e_camera : k->e, &best);
     w->rays += (uint64_t)pti_count_bits(active);
@@ -10351,20 +10494,13 @@ static unsigned pti_lock_vertex(pti_lock_work *w, pti_lane_row *row, unsigned ac
     if (options->max_edges > 0) go = pti_mw_and(go, pti_fw_lt(pti_fw_from_words(row[PTI_ROW_EDGES].u), pti_fw_set((float)options->max_edges)));
     if (!pti_mw_bits(go)) return 0;
     weight = pti_gather3(k->of, PTI_OF_ALBEDO, s.i);
+    if (k->rough) pti_lock_find_facets(k, &s, d, &f), facets = &f;
     if (w->technique != PTI_TECHNIQUE_PLAIN && k->light_count > 0) {
-        const pti_mw asks = k->specular ? pti_mw_and(go, pti_lock_is(&s, PT_MATERIAL_DIFFUSE)) : go;
-        w->rays += (uint64_t)pti_lock_direct(k, &s, weight, asks, u, row, options->heuristic);
+        pti_mw asks = k->specular ? pti_mw_and(go, pti_lock_is(&s, PT_MATERIAL_DIFFUSE)) : go;
+        if (facets) asks = pti_mw_or(asks, pti_mw_and(go, facets->rough));
+        w->rays += (uint64_t)pti_lock_direct(k, &s, facets, weight, asks, u, row, options->heuristic);
     }
-    next = pti_lock_cosine(s.n, u->bsdf0, u->bsdf1, &cosine);
-    density = pti_fw_mul(cosine, pti_fw_set((float)(1 / PT_PI)));
-    if (k->specular) {
-        const pti_mw diffuse = pti_lock_is(&s, PT_MATERIAL_DIFFUSE);
-        if (pti_mw_bits(diffuse) != pti_mw_bits(pti_mw_of_bits(~0u))) {
-            const pti_w3 bounced = pti_lock_specular(k, &s, d, u->lobe, &weight, row);
-            next = pti_w3_select(diffuse, next, bounced);
-            density = pti_fw_select(diffuse, density, pti_fw_set(-1));
-        }
-    }
+    next = pti_lock_scatter(k, &s, facets, d, u, &weight, &density, row, &go);
     beta = pti_w3_mul(pti_row3(row + PTI_ROW_BETA), weight);
     go = pti_mw_and(go, pti_fw_lt(zero, pti_fw_max(beta.x, pti_fw_max(beta.y, beta.z))));
     if (options->roulette != PT_ROULETTE_NONE) go = pti_mw_and(go, pti_lock_roulette(options, row, &beta, u_roulette));

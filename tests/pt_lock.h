@@ -181,9 +181,9 @@ static inline double within(double bound) { return pt_test_long() ? 0.4 * bound 
 /* ---- rooms ------------------------------------------------------------------------------------------------ */
 
 /* Rooms [-1,1]^3 of coloured walls, and what is in them. */
-enum { SPHERES, GLASS_BOX, MANY_LAMPS, IN_GLASS, TURNED_LAMPS, GLOWING, MESH, ROOMS };
+enum { SPHERES, GLASS_BOX, MANY_LAMPS, IN_GLASS, TURNED_LAMPS, GLOWING, MESH, METALS, ROOMS };
 static const char *const room_names[ROOMS] = {"mirror and glass sphere", "glass and mirror box", "many lamps", "eye in a glass sphere",
-                                              "lamps from behind", "things that glow", "turned room of triangles"};
+                                              "lamps from behind", "things that glow", "turned room of triangles", "metal, rough and smooth"};
 
 static inline void add_walls(pt_scene *s, int made, const place *at)
 {
@@ -240,6 +240,14 @@ static inline stage room(int kind)
             m.emission = grey(4);
             add_lamp(&s.scene, at, -0.9 + 0.6 * i, -0.3 + 0.2 * i, -0.5, 0.5, 1, pt_add_material(&s.scene, m));
         }
+    if (kind == METALS) {
+        const pt_rgb eta = rgb(0.14, 0.37, 1.44), k = rgb(3.98, 2.38, 1.6);
+        add_ball(&s.scene, at, -0.5, -0.55, -0.4, 0.4, pt_add_material(&s.scene, pt_material_conductor(eta, k, (pt_real)0.5)));
+        add_ball(&s.scene, at, 0.5, -0.5, 0, 0.4, pt_add_material(&s.scene, pt_material_conductor(rgb(1.5, 0.9, 0.6), rgb(7, 6, 5), 0)));
+        add_lamp(&s.scene, at, -0.9, -0.96, 0.1, 0.9, 1, pt_add_material(&s.scene, pt_material_conductor(k, eta, (pt_real)0.15)));
+        add_ball(&s.scene, at, 0.1, 0.3, -0.6, 0.2, material_of(&s.scene, pt_material_conductor(grey(2), grey(3), (pt_real)0.8), 0.3));
+        add_ball(&s.scene, at, -0.5, 0.2, 0.3, 0.1, lamp(&s.scene, 3, 2, 1));
+    }
     if (kind == GLOWING) {
         add_ball(&s.scene, at, -0.55, -0.5, -0.3, 0.4, material_of(&s.scene, pt_material_diffuse(rgb(0.5, 0.6, 0.7)), 1));
         add_ball(&s.scene, at, 0.5, -0.5, -0.2, 0.4, material_of(&s.scene, pt_material_dielectric((pt_real)1.4), 0.5));

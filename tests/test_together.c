@@ -35,9 +35,9 @@ static void canonical(void)
         d = desc_of(&s, 2, 2, 1);
         pt_check(pt_render(&s.scene, &d, &film, &report) == PT_OK, entry[i].name, "does not render");
         if (strncmp(report.body, "lockstep", 8) == 0) {
-            const int caustic = strcmp(entry[i].name, "glass-ball") == 0;
+            const int caustic = strcmp(entry[i].name, "glass-ball") == 0 || strcmp(entry[i].name, "veach-plates") == 0; /* or a small lamp, seen */
             picture a, b;
-            d = desc_of(&s, 12, 9, samples(caustic ? 96 : strcmp(entry[i].name, "furnace") == 0 ? 16 : 64));
+            d = desc_of(&s, 12, 9, samples(caustic ? 192 : strcmp(entry[i].name, "furnace") == 0 ? 16 : 64));
             a = pictures(&s, d, RENDERS, 400000u + 1000u * (uint64_t)i, 1);
             b = pictures(&s, d, RENDERS, 400500u + 1000u * (uint64_t)i, 0);
             compare(entry[i].name, &a, &b, within(caustic ? 0.35 : 0.1));
