@@ -9588,7 +9588,10 @@ typedef struct pti_lockstep {
                                        the distances of the opposite edges, or three. Sphere: centre, radius        */
     float of[PTI_OF_COUNT][PTI_LOCK_MAX], light[PTI_LIT_COUNT][PTI_LOCK_MAX], chosen[PTI_LOCK_MAX];
     int light_count, sphere_lights, specular, metal, rough; /* specular: something is not diffuse; some metal; some rough one */
+    int shading;                    /* some shading normals                                                */
     float e, e_camera;              /* how far a computed point may be off its plane; the same for rays of the camera */
+    const pt_scene *tree;           /* of more than that; then `of` has a column for each material, e is of lamps, and
+                                       rays are asked one after the other                                        */
 } pti_lockstep;
 
 /* A primitive while the scene is being made ready: 0 (sphere), 3 or 4 corners. */
@@ -9608,22 +9611,28 @@ static int pti_lock_axis(const pti_lock_item *q)
     return none[0] ? 0 : none[1] ? 1 : none[2] ? 2 : -1;
 }
 
+static void pti_lock_single(const pt_scene *scene, const pt_primitive *p, pti_lock_item *q)
+{
+    memset(q, 0, sizeof *q);
+    q->material = pti_primitive_material(scene, p);
+    q->light = p->light;
+    q->twin = -1;
+    q->kind = PTI_LOCK_SPHERES;
+    if (p->shape != PT_SHAPE_SPHERE) {
+        q->corners = pti_corners(scene, p, q->c);
+        return;
+    }
+    q->c[0] = scene->spheres[p->index].centre;
+    q->radius = (double)scene->spheres[p->index].radius;
+}
+
 /* Item from primitive i (and perhaps i + 1, which then is its other half); how many it takes. */
 static uint32_t pti_lock_collect(const pt_scene *scene, uint32_t i, double extent, pti_lock_item *q)
 {
     const pt_primitive *p = &scene->primitives[i];
     pt_vec3 other[4], all[4];
-    memset(q, 0, sizeof *q);
-    q->material = pti_primitive_material(scene, p);
-    q->light = p->light;
-    q->twin = -1;
-    if (p->shape == PT_SHAPE_SPHERE) {
-        q->c[0] = scene->spheres[p->index].centre;
-        q->radius = (double)scene->spheres[p->index].radius;
-        q->kind = PTI_LOCK_SPHERES;
-        return 1;
-    }
-    q->corners = pti_corners(scene, p, q->c);
+    pti_lock_single(scene, p, q);
+    if (q->corners == 0) return 1;
     if (q->corners == 3 && i + 1 < scene->primitive_count && p[1].shape == PT_SHAPE_TRIANGLE && pti_corners(scene, &p[1], other) == 3 &&
         pti_primitive_material(scene, &p[1]) == q->material && pti_is_parallelogram(q->c, other, extent, all)) {
         memcpy(q->c, all, sizeof all);
@@ -9759,10 +9768,23 @@ static void pti_lock_write_light(pti_lockstep *k, const pt_scene *scene, const p
     k->sphere_lights += q->corners == 0;
 }
 
+static void pti_lock_write_material(pti_lockstep *k, const pt_material *m, int i)
+{
+    pti_lock_put(k->of, PTI_OF_ALBEDO, i, pti_d((double)m->albedo.r, (double)m->albedo.g, (double)m->albedo.b));
+    k->of[PTI_OF_KIND][i] = (float)m->kind;
+    k->of[PTI_OF_IOR][i] = (float)pti_ior(m);
+    k->specular |= m->kind != PT_MATERIAL_DIFFUSE;
+    if (m->kind != PT_MATERIAL_CONDUCTOR) return;
+    k->of[PTI_OF_ALPHA][i] = pti_is_smooth(m) ? 0 : (float)m->roughness * (float)m->roughness;
+    pti_lock_put(k->of, PTI_OF_ETA, i, pti_d((double)m->eta.r, (double)m->eta.g, (double)m->eta.b));
+    pti_lock_put(k->of, PTI_OF_K, i, pti_d((double)m->k.r, (double)m->k.g, (double)m->k.b));
+    k->metal = 1;
+    k->rough |= !pti_is_smooth(m);
+}
+
 /* Writes item q as number i; returns its smallest measure: from the middle to an edge, across a ball. */
 static double pti_lock_write(pti_lockstep *k, const pt_scene *scene, const pti_lock_item *q, int i, double *sum)
 {
-    const pt_material *m = &scene->materials[q->material];
     pti_d3 n = pti_d(0, 0, 0);
     double depth = q->radius;
     if (q->corners) {
@@ -9779,18 +9801,8 @@ static double pti_lock_write(pti_lockstep *k, const pt_scene *scene, const pti_l
     pti_lock_put(k->of, PTI_OF_CENTRE, i, pti_lock_middle(q));
     k->of[PTI_OF_DEPTH][i] = (float)depth;
     k->of[PTI_OF_RADIUS][i] = (float)q->radius;
-    pti_lock_put(k->of, PTI_OF_ALBEDO, i, pti_d((double)m->albedo.r, (double)m->albedo.g, (double)m->albedo.b));
-    k->of[PTI_OF_KIND][i] = (float)m->kind;
-    k->of[PTI_OF_IOR][i] = (float)pti_ior(m);
+    pti_lock_write_material(k, &scene->materials[q->material], i);
     k->of[PTI_OF_LIGHT][i] = -1;
-    k->specular |= m->kind != PT_MATERIAL_DIFFUSE;
-    if (m->kind == PT_MATERIAL_CONDUCTOR) {
-        k->of[PTI_OF_ALPHA][i] = pti_is_smooth(m) ? 0 : (float)m->roughness * (float)m->roughness;
-        pti_lock_put(k->of, PTI_OF_ETA, i, pti_d((double)m->eta.r, (double)m->eta.g, (double)m->eta.b));
-        pti_lock_put(k->of, PTI_OF_K, i, pti_d((double)m->k.r, (double)m->k.g, (double)m->k.b));
-        k->metal = 1;
-        k->rough |= !pti_is_smooth(m);
-    }
     if (q->light >= 0) {
         k->of[PTI_OF_LIGHT][i] = (float)k->light_count;
         pti_lock_write_light(k, scene, q, n, sum);
@@ -9807,14 +9819,56 @@ static int pti_lock_takes(const pt_material *m)
     return m->kind != PT_MATERIAL_CONDUCTOR || (most < 1e6 && (pti_is_smooth(m) || (double)m->roughness * (double)m->roughness >= 1 / 2048.));
 }
 
+/* Does a scene need nothing else, but perhaps `more`? */
+static int pti_lock_knows(const pt_scene *scene, unsigned more)
+{
+    const unsigned known = more | PT_NEEDS_TRIANGLES | PT_NEEDS_PARALLELOGRAMS | PT_NEEDS_SPHERES | PT_NEEDS_DIFFUSE | PT_NEEDS_MIRROR |
+                           PT_NEEDS_DIELECTRIC | PT_NEEDS_CONDUCTOR | PT_NEEDS_ROUGHNESS | PT_NEEDS_UVS | PT_NEEDS_AREA_LIGHTS | PT_NEEDS_BVH;
+    return (scene->needs & ~known) == 0 && scene->primitive_count > 0;
+}
+
+static int pti_lock_bright(const pti_lockstep *k)
+{
+    int j;
+    for (j = 0; j < k->light_count; j++)
+        if (!(k->light[PTI_LIT_DENSITY][j] > 0)) return 0; /* too dim for 24 bits */
+    return 1;
+}
+
+/* Makes a scene of any size ready, whose rays are asked of its tree. Lamps are few, and as large beside e as what a small scene is
+   made of: their points are in float. */
+static int pti_lockstep_make_tree(pti_lockstep *k, const pt_scene *scene)
+{
+    double smallest = HUGE_VAL, sum = 0, x = 0;
+    uint32_t i, j;
+    if (!pti_lock_knows(scene, PT_NEEDS_SHADING_NORMALS) || scene->material_count > PTI_LOCK_MAX || scene->light_count > PTI_LOCK_MAX) return 0;
+    memset(k, 0, sizeof *k);
+    k->tree = scene;
+    k->shading = (scene->needs & PT_NEEDS_SHADING_NORMALS) != 0;
+    for (i = 0; i < scene->material_count; i++) {
+        if (!pti_lock_takes(&scene->materials[i])) return 0;
+        pti_lock_write_material(k, &scene->materials[i], (int)i);
+    }
+    for (i = 0; i < scene->light_count; i++) {
+        pti_lock_item q;
+        float unused[16];
+        pti_lock_single(scene, &scene->primitives[scene->lights[i].primitive], &q);
+        for (j = 0; j < (q.corners ? (uint32_t)q.corners : 1); j++)
+            x = fmax(x, q.radius + pti_max3(fabs((double)q.c[j].x), fabs((double)q.c[j].y), fabs((double)q.c[j].z)));
+        q.kind = PTI_LOCK_TRIANGLES;
+        smallest = fmin(smallest, q.corners ? pti_lock_write_flat(&q, unused) : 2 * q.radius);
+        pti_lock_write_light(k, scene, &q, q.corners ? pti_lock_normal(&q) : pti_d(0, 0, 0), &sum);
+    }
+    k->e = (float)(17 * PTI_2_M24 * x);
+    return pti_lock_bright(k) && smallest > 2048 * (double)k->e && x < 1e15;
+}
+
 /* Makes a scene ready; 0: it is not one for lanes, or not seen from such a place. With u = 2^-24 and all coordinates at
    most x, the height n.p + d of a point is computed with an error of 3 roundings of at most 3.5 x each, putting the
    point back on the plane rounds its coordinates once (1.8 u x), and a plane is off its corners by the roundings of n
    and d (4.4 u x): all together below 17 u x = e. */
 static int pti_lockstep_make(pti_lockstep *k, const pt_scene *scene, pt_vec3 eye)
 {
-    const unsigned taken = PT_NEEDS_TRIANGLES | PT_NEEDS_PARALLELOGRAMS | PT_NEEDS_SPHERES | PT_NEEDS_DIFFUSE | PT_NEEDS_MIRROR |
-                           PT_NEEDS_DIELECTRIC | PT_NEEDS_CONDUCTOR | PT_NEEDS_ROUGHNESS | PT_NEEDS_UVS | PT_NEEDS_AREA_LIGHTS | PT_NEEDS_BVH;
     const double x = fmax(pti_max3((double)scene->lo.x, (double)scene->lo.y, (double)scene->lo.z),
                           pti_max3((double)scene->hi.x, (double)scene->hi.y, (double)scene->hi.z));
     const double from = fmax(x, pti_max3((double)eye.x, (double)eye.y, (double)eye.z));
@@ -9822,7 +9876,7 @@ static int pti_lockstep_make(pti_lockstep *k, const pt_scene *scene, pt_vec3 eye
     double smallest = HUGE_VAL, sum = 0;
     uint32_t i;
     int count = 0, n = 0, kind, j, blocks;
-    if ((scene->needs & ~taken) || scene->primitive_count < 1 || scene->primitive_count > PTI_LOCK_MAX) return 0;
+    if (!pti_lock_knows(scene, 0) || scene->primitive_count > PTI_LOCK_MAX) return 0;
     memset(k, 0, sizeof *k);
     k->e = (float)(17 * PTI_2_M24 * x);
     k->e_camera = (float)(17 * PTI_2_M24 * from);
@@ -9842,9 +9896,7 @@ static int pti_lockstep_make(pti_lockstep *k, const pt_scene *scene, pt_vec3 eye
         }
     }
     k->begin[PTI_LOCK_CLASSES] = n;
-    for (j = 0; j < k->light_count; j++)
-        if (!(k->light[PTI_LIT_DENSITY][j] > 0)) return 0; /* too dim for 24 bits */
-    return smallest > 2048 * (double)k->e && smallest > 64 * (double)k->e_camera && (double)k->e > 1e-30 && x < 1e15;
+    return pti_lock_bright(k) && smallest > 2048 * (double)k->e && smallest > 64 * (double)k->e_camera && (double)k->e > 1e-30 && x < 1e15;
 }
 
 /* --- rays --- */
@@ -10028,7 +10080,7 @@ static pti_uw pti_lock_sobol(pti_uw n, int d)
 /* The state of a path, a row of lanes each. Density < 0: the last direction came from a delta lobe, or the camera. */
 enum {
     PTI_ROW_O, PTI_ROW_D = 3, PTI_ROW_BETA = 6, PTI_ROW_SUM = 9, PTI_ROW_DENSITY = 12, PTI_ROW_ETA2, PTI_ROW_A, PTI_ROW_B,
-    PTI_ROW_SLOT, PTI_ROW_EDGES, PTI_ROWS
+    PTI_ROW_SLOT, PTI_ROW_EDGES, PTI_ROW_LOW, PTI_ROWS = PTI_ROW_LOW + 3 /* low: what a float takes from the origin */
 };
 
 /* The decisions of one vertex. */
@@ -10039,10 +10091,10 @@ typedef struct pti_lock_numbers {
 /* What is hit. */
 typedef struct pti_lock_surface {
     pti_uw i;
-    pti_w3 p, n;            /* point, and normal on the side that the path came from                       */
-    pti_fw cosine;          /* of the ray and that normal                                                  */
+    pti_w3 p, n, ng;        /* point; normals, for shading and of the surface, on the side the path came from */
+    pti_fw cosine, facing;  /* of the way back and these normals                                           */
     pti_mw met, front, ball; /* anything at all; from the side of ng; a sphere                             */
-    pti_fw kind;
+    pti_fw kind, light;     /* of its material; number of its light, or -1                                */
 } pti_lock_surface;
 
 PTI_INLINE pti_w3 pti_row3(const pti_lane_row *row) { return pti_w3_make(row[0].f, row[1].f, row[2].f); }
@@ -10055,6 +10107,16 @@ PTI_INLINE void pti_row3_set(pti_lane_row *row, pti_w3 v)
 PTI_INLINE pti_w3 pti_gather3(const float (*table)[PTI_LOCK_MAX], int row, pti_uw i)
 {
     return pti_w3_make(pti_fw_gather(table[row], i), pti_fw_gather(table[row + 1], i), pti_fw_gather(table[row + 2], i));
+}
+
+/* The side of a surface, with normal n, that the path came from. */
+PTI_INLINE8 void pti_lock_face(const pti_lockstep *k, pti_lock_surface *s, pti_w3 n, pti_w3 d)
+{
+    const pti_fw along = pti_w3_dot(n, d);
+    s->front = pti_fw_lt(along, pti_fw_set(0));
+    s->cosine = s->facing = pti_fw_abs(along);
+    s->n = s->ng = pti_w3_select(s->front, n, pti_w3_scale(n, pti_fw_set(-1)));
+    s->kind = k->specular ? pti_fw_gather(k->of[PTI_OF_KIND], s->i) : pti_fw_set((float)PT_MATERIAL_DIFFUSE);
 }
 
 /* The point at t, put back on its surface and away from its edges. */
@@ -10078,11 +10140,84 @@ PTI_INLINE8 void pti_lock_land(const pti_lockstep *k, pti_w3 o, pti_w3 d, const 
         n = pti_w3_select(s->ball, out, n);
         s->p = pti_w3_select(s->ball, pti_w3_along(out, pti_fw_gather(k->of[PTI_OF_RADIUS], s->i), centre), s->p);
     }
-    s->cosine = pti_w3_dot(n, d);
-    s->front = pti_fw_lt(s->cosine, zero);
-    s->cosine = pti_fw_abs(s->cosine);
-    s->n = pti_w3_select(s->front, n, pti_w3_scale(n, pti_fw_set(-1)));
-    s->kind = k->specular ? pti_fw_gather(k->of[PTI_OF_KIND], s->i) : pti_fw_set((float)PT_MATERIAL_DIFFUSE);
+    s->light = pti_fw_gather(k->of[PTI_OF_LIGHT], s->i);
+    pti_lock_face(k, s, n, d);
+}
+
+/* The ray of a lane, with all digits of its origin. */
+static pti_ray pti_lock_ray(const pti_lane_row *row, int lane)
+{
+    double o[3];
+    int k;
+    for (k = 0; k < 3; k++) o[k] = (double)row[PTI_ROW_O + k].v[lane] + (double)row[PTI_ROW_LOW + k].v[lane];
+    return pti_ray_from(pti_d(o[0], o[1], o[2]), pti_d((double)row[PTI_ROW_D].v[lane], (double)row[PTI_ROW_D + 1].v[lane], (double)row[PTI_ROW_D + 2].v[lane]), HUGE_VAL);
+}
+
+/* pti_lock_nearest and pti_lock_land by the scene's tree. */
+static void pti_lock_meet(const pti_lockstep *k, const pti_lane_row *row, unsigned active, pt_hit *hits, pti_lock_best *best, pti_lock_surface *s)
+{
+    pti_lane_row p[3], n[3], ns[3], t, i, light;
+    unsigned balls = 0;
+    memset(p, 0, sizeof p);
+    memset(n, 0, sizeof n);
+    memset(ns, 0, sizeof ns);
+    memset(&i, 0, sizeof i);
+    t.f = pti_fw_set(PTI_LOCK_FAR);
+    light.f = pti_fw_set(-1);
+    for (; active; active &= active - 1) {
+        const int lane = pti_lowest_bit(active);
+        const pti_ray r = pti_lock_ray(row, lane);
+        pt_hit *hit = &hits[lane];
+        if (!pti_intersect(k->tree, &r, hit)) continue;
+        t.v[lane] = hit->t;
+        i.bits[lane] = (uint32_t)hit->material;
+        light.v[lane] = (float)hit->light;
+        balls |= (unsigned)(hit->shape == PT_SHAPE_SPHERE) << lane;
+        p[0].v[lane] = hit->p.x, p[1].v[lane] = hit->p.y, p[2].v[lane] = hit->p.z;
+        n[0].v[lane] = hit->ng.x, n[1].v[lane] = hit->ng.y, n[2].v[lane] = hit->ng.z;
+        ns[0].v[lane] = hit->ns.x, ns[1].v[lane] = hit->ns.y, ns[2].v[lane] = hit->ns.z;
+    }
+    best->t = t.f;
+    s->i = i.u;
+    s->p = pti_row3(p);
+    s->ball = pti_mw_of_bits(balls);
+    s->light = light.f;
+    pti_lock_face(k, s, pti_row3(n), pti_row3(row + PTI_ROW_D));
+    if (!k->shading) return;
+    s->n = pti_w3_select(s->front, pti_row3(ns), pti_w3_scale(pti_row3(ns), pti_fw_set(-1)));
+    s->cosine = pti_fw_sub(pti_fw_set(0), pti_w3_dot(s->n, pti_row3(row + PTI_ROW_D)));
+}
+
+/* Shadow rays by the tree, from hits to points of lights that are moved off: the lanes that something blocks. */
+static pti_mw pti_lock_blocked(const pti_lockstep *k, const pt_hit *hits, unsigned active, pti_w3 q, pti_w3 w)
+{
+    pti_lane_row to[3], d[3];
+    unsigned blocked = 0;
+    pti_row3_set(to, q);
+    pti_row3_set(d, w);
+    for (; active; active &= active - 1) {
+        const int lane = pti_lowest_bit(active);
+        const pti_d3 o = pti_leave(&hits[lane], pt_v3(d[0].v[lane], d[1].v[lane], d[2].v[lane]));
+        const pti_d3 end = pti_d((double)to[0].v[lane], (double)to[1].v[lane], (double)to[2].v[lane]);
+        const pti_ray r = pti_ray_from(o, pti_d_sub(end, o), 1);
+        blocked |= (unsigned)pti_occluded(k->tree, &r) << lane;
+    }
+    return pti_mw_of_bits(blocked);
+}
+
+/* The next origins of lanes. */
+static void pti_lock_depart(pti_lane_row *row, const pt_hit *hits, unsigned active)
+{
+    for (; active; active &= active - 1) {
+        const int lane = pti_lowest_bit(active);
+        const pti_d3 o = pti_leave(&hits[lane], pt_v3(row[PTI_ROW_D].v[lane], row[PTI_ROW_D + 1].v[lane], row[PTI_ROW_D + 2].v[lane]));
+        const double all[3] = {o.x, o.y, o.z};
+        int k;
+        for (k = 0; k < 3; k++) {
+            row[PTI_ROW_O + k].v[lane] = (float)all[k];
+            row[PTI_ROW_LOW + k].v[lane] = (float)(all[k] - (double)row[PTI_ROW_O + k].v[lane]);
+        }
+    }
 }
 
 PTI_INLINE pti_mw pti_lock_is(const pti_lock_surface *s, pt_material_kind kind)
@@ -10114,21 +10249,21 @@ PTI_INLINE8 void pti_lock_emission(const pti_lockstep *k, const pti_lock_surface
                                   int technique, pt_heuristic heuristic)
 {
     const pti_fw zero = pti_fw_set(0), one = pti_fw_set(1), q = row[PTI_ROW_DENSITY].f;
-    const pti_fw number = pti_fw_gather(k->of[PTI_OF_LIGHT], s->i);
-    const pti_mw lit = pti_mw_and(s->met, pti_mw_and(pti_fw_le(zero, number), pti_mw_or(s->front, s->ball)));
+    const pti_mw lit = pti_mw_and(s->met, pti_mw_and(pti_fw_le(zero, s->light), pti_mw_or(s->front, s->ball)));
     const pti_mw delta = pti_fw_lt(q, zero);
     pti_uw light;
     pti_w3 value;
     pti_fw p, weight = one;
     if (!pti_mw_bits(lit)) return;
-    light = pti_uw_from_floats(pti_fw_max(zero, number));
+    light = pti_uw_from_floats(pti_fw_max(zero, s->light));
     value = pti_w3_mul(pti_row3(row + PTI_ROW_BETA), pti_gather3(k->light, PTI_LIT_EMISSION, light));
     if (technique != PTI_TECHNIQUE_PLAIN) {
         const pti_fw density = pti_fw_gather(k->light[PTI_LIT_DENSITY], light);
-        p = pti_fw_div(pti_fw_mul(density, pti_fw_mul(best->t, best->t)), s->cosine);
+        p = pti_fw_div(pti_fw_mul(density, pti_fw_mul(best->t, best->t)), s->facing);
         if (k->sphere_lights && pti_mw_bits(pti_mw_and(lit, s->ball))) {
             const pti_w3 c = pti_w3_sub(pti_gather3(k->light, PTI_LIT_P, light), pti_row3(row + PTI_ROW_O));
-            const pti_fw omc = pti_lock_cone(pti_fw_gather(k->light[PTI_LIT_RADIUS], light), pti_w3_dot(c, c));
+            const pti_fw cone = pti_lock_cone(pti_fw_gather(k->light[PTI_LIT_RADIUS], light), pti_w3_dot(c, c));
+            const pti_fw omc = pti_fw_select(s->front, cone, pti_fw_set(2)); /* from within also where the origin lies on the ball */
             p = pti_fw_select(s->ball, pti_fw_div(density, pti_fw_mul(pti_fw_set((float)(2 * PT_PI)), omc)), p);
         }
         weight = pti_fw_select(delta, one, pti_lock_weight(q, p, heuristic));
@@ -10162,11 +10297,11 @@ PTI_INLINE8 void pti_lock_turn(pti_fw u, pti_fw *c, pti_fw *s)
     *s = pti_fw_sub(pti_fw_set(0), y);
 }
 
-/* How far along s->n the next ray starts, if it goes to w: 2 e off the surface, 8 e inside balls. A point of a wall that touches
+/* How far along s->ng the next ray starts, if it goes to w: 2 e off the surface, 8 e inside balls. A point of a wall that touches
    a ball can start no more than 3 e inside it: so pti_lock_balls tells them apart. */
 PTI_INLINE8 pti_fw pti_lock_lift(const pti_lockstep *k, const pti_lock_surface *s, pti_w3 w)
 {
-    const pti_fw zero = pti_fw_set(0), along = pti_w3_dot(s->n, w);
+    const pti_fw zero = pti_fw_set(0), along = pti_w3_dot(s->ng, w);
     const pti_fw out = pti_fw_select(s->front, along, pti_fw_sub(zero, along));
     const pti_fw far = pti_fw_select(pti_mw_and(s->ball, pti_fw_lt(out, zero)), pti_fw_set(8 * k->e), pti_fw_set(2 * k->e));
     return pti_fw_select(pti_fw_lt(along, zero), pti_fw_sub(zero, far), far);
@@ -10316,12 +10451,12 @@ PTI_INLINE8 pti_fw pti_lock_flat_point(const pti_lockstep *k, pti_uw light, cons
     return pti_lit(k, PTI_LIT_DENSITY, light);
 }
 
-/* Asks a point of a light for its light; how many rays that took. f: NULL where nothing is rough. */
-PTI_INLINE8 int pti_lock_direct(const pti_lockstep *k, const pti_lock_surface *s, const pti_lock_facets *f, pti_w3 albedo, pti_mw active,
-                               const pti_lock_numbers *u, pti_lane_row *row, pt_heuristic heuristic)
+/* Asks a point of a light for its light; how many rays that took. hits: for trees; f: NULL where nothing is rough. */
+PTI_INLINE8 int pti_lock_direct(const pti_lockstep *k, const pti_lock_surface *s, const pt_hit *hits, const pti_lock_facets *f, pti_w3 albedo,
+                               pti_mw active, const pti_lock_numbers *u, pti_lane_row *row, pt_heuristic heuristic)
 {
     const pti_fw zero = pti_fw_set(0);
-    const pti_w3 o = pti_w3_along(s->n, pti_lock_lift(k, s, s->n), s->p);
+    const pti_w3 o = pti_w3_along(s->ng, pti_lock_lift(k, s, s->ng), s->p);
     pti_fw number = zero, density, distance2, distance, here, there, p, other, weight;
     pti_w3 q, n, w, to, value;
     pti_mw flat = pti_mw_of_bits(~0u);
@@ -10346,6 +10481,7 @@ PTI_INLINE8 int pti_lock_direct(const pti_lockstep *k, const pti_lock_surface *s
     there = pti_fw_sub(zero, pti_w3_dot(n, w));
     p = pti_fw_select(flat, pti_fw_div(pti_fw_mul(density, distance2), there), density);
     active = pti_mw_and(active, pti_mw_and(pti_fw_lt(zero, here), pti_fw_lt(zero, p)));
+    if (k->shading) active = pti_mw_and(active, pti_fw_lt(zero, pti_w3_dot(s->ng, w)));
     rays = pti_count_bits(pti_mw_bits(active));
     if (rays == 0) return 0;
     end.t = distance;
@@ -10360,7 +10496,7 @@ PTI_INLINE8 int pti_lock_direct(const pti_lockstep *k, const pti_lock_surface *s
         other = pti_fw_select(some, of_facets, other);
     }
     weight = pti_fw_div(pti_lock_weight(p, other, heuristic), p);
-    weight = pti_fw_select(pti_lock_ask(k, o, w, k->e, &end, PTI_LOCK_ANY), zero, weight);
+    weight = pti_fw_select(k->tree ? pti_lock_blocked(k, hits, pti_mw_bits(active), q, w) : pti_lock_ask(k, o, w, k->e, &end, PTI_LOCK_ANY), zero, weight);
     weight = pti_fw_select(active, weight, zero);
     value = pti_w3_mul(value, pti_w3_mul(pti_row3(row + PTI_ROW_BETA), pti_lit3(k, PTI_LIT_EMISSION, light)));
     pti_row3_set(row + PTI_ROW_SUM, pti_w3_along(value, weight, pti_row3(row + PTI_ROW_SUM)));
@@ -10426,6 +10562,10 @@ PTI_INLINE8 pti_w3 pti_lock_scatter(const pti_lockstep *k, const pti_lock_surfac
             *go = pti_mw_and(*go, pti_mw_or(above, pti_fw_le(pti_fw_gather(k->of[PTI_OF_ALPHA], s->i), pti_fw_set(0))));
         }
     }
+    if (k->shading) { /* both normals must agree on the sides */
+        const pti_fw zero = pti_fw_set(0), sides = pti_fw_mul(pti_w3_dot(s->n, next), pti_w3_dot(s->ng, next));
+        *go = pti_mw_and(*go, pti_mw_and(pti_fw_lt(zero, sides), pti_mw_or(diffuse, pti_fw_lt(zero, s->cosine))));
+    }
     return next;
 }
 
@@ -10455,6 +10595,7 @@ typedef struct pti_lock_work {
     unsigned hit;                   /* lanes whose first edge met something, and what that is: albedo,     */
     pti_lane_row seen[7];           /*   normal, distance                                                  */
     pti_lane_row row[PTI_ROWS];
+    pt_hit hits[PTI_WIDTH];         /* what lanes have met, where a tree is asked                           */
     uint32_t queue[PTI_LOCK_QUEUE][PTI_ROWS]; /* paths that wait for a lane                                */
     double slots[PTI_LOCK_SLOTS][3]; /* what each path has found                                           */
 } pti_lock_work;
@@ -10484,10 +10625,14 @@ static unsigned pti_lock_vertex(pti_lock_work *w, pti_lane_row *row, unsigned ac
     pti_w3 weight, beta, next;
     pti_fw density;
     pti_mw go;
-    pti_lock_nearest(k, o, d, first ? k->e_camera : k->e, &best);
     w->rays += (uint64_t)pti_count_bits(active);
+    if (k->tree) {
+        pti_lock_meet(k, row, active, w->hits, &best, &s);
+    } else {
+        pti_lock_nearest(k, o, d, first ? k->e_camera : k->e, &best);
+        pti_lock_land(k, o, d, &best, &s);
+    }
     s.met = pti_mw_and(pti_mw_of_bits(active), pti_fw_lt(best.t, pti_fw_set(PTI_LOCK_FAR)));
-    pti_lock_land(k, o, d, &best, &s);
     if (first && w->describes) pti_lock_describe(w, &s, &best);
     pti_lock_emission(k, &s, &best, row, w->technique, options->heuristic);
     go = s.met;
@@ -10497,8 +10642,8 @@ static unsigned pti_lock_vertex(pti_lock_work *w, pti_lane_row *row, unsigned ac
     if (k->rough) pti_lock_find_facets(k, &s, d, &f), facets = &f;
     if (w->technique != PTI_TECHNIQUE_PLAIN && k->light_count > 0) {
         pti_mw asks = k->specular ? pti_mw_and(go, pti_lock_is(&s, PT_MATERIAL_DIFFUSE)) : go;
-        if (facets) asks = pti_mw_or(asks, pti_mw_and(go, facets->rough));
-        w->rays += (uint64_t)pti_lock_direct(k, &s, facets, weight, asks, u, row, options->heuristic);
+        if (facets) asks = pti_mw_or(asks, pti_mw_and(pti_mw_and(go, pti_fw_lt(zero, s.cosine)), facets->rough));
+        w->rays += (uint64_t)pti_lock_direct(k, &s, w->hits, facets, weight, asks, u, row, options->heuristic);
     }
     next = pti_lock_scatter(k, &s, facets, d, u, &weight, &density, row, &go);
     beta = pti_w3_mul(pti_row3(row + PTI_ROW_BETA), weight);
@@ -10506,7 +10651,8 @@ static unsigned pti_lock_vertex(pti_lock_work *w, pti_lane_row *row, unsigned ac
     if (options->roulette != PT_ROULETTE_NONE) go = pti_mw_and(go, pti_lock_roulette(options, row, &beta, u_roulette));
     pti_row3_set(row + PTI_ROW_BETA, beta);
     pti_row3_set(row + PTI_ROW_D, next);
-    pti_row3_set(row + PTI_ROW_O, pti_w3_along(s.n, pti_lock_lift(k, &s, next), s.p));
+    if (k->tree) pti_lock_depart(row, w->hits, pti_mw_bits(go));
+    else pti_row3_set(row + PTI_ROW_O, pti_w3_along(s.n, pti_lock_lift(k, &s, next), s.p));
     row[PTI_ROW_DENSITY].f = density;
     row[PTI_ROW_EDGES].u = pti_uw_add(row[PTI_ROW_EDGES].u, pti_uw_set(1));
     return pti_mw_bits(go);
@@ -10581,6 +10727,7 @@ static void pti_lock_start(pti_lock_work *w, pti_lane_row *row, unsigned active,
     row[PTI_ROW_DENSITY].f = pti_fw_set(-1);
     row[PTI_ROW_ETA2].f = one;
     row[PTI_ROW_EDGES].u = pti_uw_set(1);
+    pti_row3_set(row + PTI_ROW_LOW, pti_w3_make(zero, zero, zero));
     on = pti_lock_vertex(w, row, active, u, roulette, 1);
     pti_lock_flush(w, row, active & ~on);
     for (on &= active; on; on &= on - 1) {
@@ -13045,7 +13192,8 @@ static int pti_pick_lockstep(const pt_method *method, const pt_scene *scene, con
 #endif
     if (d->no_lockstep || d->general_body || d->sampler == PT_SAMPLER_STRATIFIED) return 0;
     if (d->li.max_edges >= 1 << 24 || d->li.roulette_start >= 1 << 24) return 0; /* they are counted in floats */
-    return pti_lockstep_make(out, scene, pt_v3(pti_fabs(c->position.x) + ahead, pti_fabs(c->position.y) + ahead, pti_fabs(c->position.z) + ahead));
+    if (pti_lockstep_make(out, scene, pt_v3(pti_fabs(c->position.x) + ahead, pti_fabs(c->position.y) + ahead, pti_fabs(c->position.z) + ahead))) return 1;
+    return pti_lockstep_make_tree(out, scene);
 }
 #endif
 
@@ -13861,7 +14009,7 @@ static pt_result pti_render(pti_pass *p, pt_film *film, pt_report *report)
 #if PTI_HAS_LOCKSTEP
     if (pti_pick_lockstep(method, p->scene, d, &lockstep, &p->technique)) {
         p->lockstep = &lockstep;
-        report->body = PTI_WIDTH == 16 ? "lockstep16" : "lockstep8";
+        report->body = PTI_WIDTH == 16 ? (lockstep.tree ? "lockstep16-tree" : "lockstep16") : lockstep.tree ? "lockstep8-tree" : "lockstep8";
     }
 #endif
     p->options = d->li;

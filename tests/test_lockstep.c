@@ -51,7 +51,8 @@ static void add_things(pt_scene *s, double lift, int m)
     add_ball(s, &HERE, 0.7, 0.5, lift > 0 ? -0.5 : -0.9, 0.18, m); /* and one is half in the wall         */
 }
 
-static stage furnace(int kind, double rho)
+/* by_tree: it asks its tree. */
+static stage furnace(int kind, double rho, int by_tree)
 {
     static const place places[FURNACES] = {{0, 1, 0, 0, 0},      {0, 1, 0.3, 0.2, 0.1}, {0.7, 1, 0, 0, 0},       {0.4, 1, 0, 0, 0}, {0.9, 1, 0.1, 0, -1},
                                            {0, 1, 0, 0, 0},      {0, 1, 0, 0.5, 0},     {0, 1, 0, 0, 0},         {0.3, 1, 0, 0, 0}, {0.7, 1, 70, -40, 30},
@@ -70,18 +71,19 @@ static stage furnace(int kind, double rho)
     if (kind == SHELLS) add_ball(&s.scene, at, 0.1, 0, -0.2, 0.5, m);
     if (wedge) s.camera = camera_at(at, 0.9, 0.02, 0.5, 0, 0, 0.4, 0.1); /* it looks at the edge, on which a row of paths lands */
     if (kind == THINGS || kind == TOUCHING) add_things(&s.scene, kind == THINGS ? 0.05 : 0, m);
+    if (by_tree) add_speck(&s.scene, at);
     commit(&s);
     return s;
 }
 
 /* Every path of k edges gives 1 + rho + ... + rho^(k-1), and walks k edges: not one may get out. Along the edges of things in the
    room and where they touch, one in a million edges may get in, or between them and out: those strips are some e = 1e-6 wide. */
-static double walk_to_the_end(int kind, double rho, int k, uint32_t spp)
+static double walk_to_the_end(int kind, double rho, int k, uint32_t spp, int by_tree)
 {
-    const int width = 29, height = 23, refusable = kind == THIN_WEDGE, touching = kind == TOUCHING || kind == THINGS;
+    const int width = 29, height = 23, touching = kind == TOUCHING || kind == THINGS;
     const double r = (double)(pt_real)rho, exact = (1 - pow(r, k)) / (1 - r), paths = (double)spp * width * height;
-    const char *name = label("%s, %d edges", furnace_names[kind], k);
-    stage s = furnace(kind, rho);
+    const char *name = label("%s%s, %d edges", furnace_names[kind], by_tree ? ", by its tree" : "", k);
+    stage s = furnace(kind, rho, by_tree);
     pt_render_desc d = desc_of(&s, width, height, spp);
     pt_film film;
     uint64_t rays;
@@ -89,7 +91,7 @@ static double walk_to_the_end(int kind, double rho, int k, uint32_t spp)
     d.method = "path-plain";
     d.li.max_edges = k;
     d.li.roulette = PT_ROULETTE_NONE;
-    film = render(&s, &d, refusable ? -1 : 1, &rays);
+    film = render(&s, &d, by_tree ? 2 : 1, &rays);
     for (h = 0; h < 2; h++)
         for (i = 0; i < width * height; i++) wrong += memcmp(film.half[h] + 3 * i, film.half[0], 3 * sizeof film.half[0][0]) != 0;
     pt_check((double)rays == paths * k || (touching && (double)rays >= (1 - 1e-6 * k) * paths * k), name, "%.0f of %.0f edges are missing", paths * k - (double)rays,
@@ -110,24 +112,25 @@ static void no_way_out(void)
     int kind;
     for (kind = 0; kind < FURNACES; kind++) {
         const uint32_t few = pt_test.is_short ? 1 : WHOLE ? 3 : 2, more = kind == THINGS ? 6 * few : few;
-        if (kind != THIN_WEDGE) edges += walk_to_the_end(kind, 0.999, 500, 2 * more);
-        if (WHOLE || kind == WEDGE) edges += walk_to_the_end(kind, 0.9, 10, kind == THIN_WEDGE ? 2 : 8 * few);
+        if (kind != THIN_WEDGE) edges += walk_to_the_end(kind, 0.999, 500, 2 * more, 0);
+        if (WHOLE || kind == WEDGE) edges += walk_to_the_end(kind, 0.9, 10, kind == THIN_WEDGE ? 2 : 8 * few, kind == THIN_WEDGE);
+        if (WHOLE || kind == FANS) edges += walk_to_the_end(kind, 0.999, 200, 2, 1);
     }
     printf("edges walked in closed scenes: %.4g\n", edges);
 }
 
 /* Paths that end by roulette: 1 / (1 - rho) in the mean. Light sampling alone has no variance where walls meet, so it is asked
    in balls only. */
-static void furnace_mean(int kind, double rho, const char *method, int max_edges, uint32_t spp, double bound)
+static void furnace_mean(int kind, double rho, const char *method, int max_edges, uint32_t spp, double bound, int by_tree)
 {
     const double r = (double)(pt_real)rho, exact = max_edges ? (1 - pow(r, max_edges)) / (1 - r) : 1 / (1 - r);
-    stage s = furnace(kind, rho);
+    stage s = furnace(kind, rho, by_tree);
     pt_render_desc d = desc_of(&s, 8, 6, samples(spp));
     picture p;
     d.method = method;
     d.li.max_edges = max_edges;
-    p = pictures(&s, d, RENDERS, 1000u + 10000u * (uint64_t)kind, 1);
-    pt_check_mean(label("%s, rho %g, %s%s", furnace_names[kind], rho, method, max_edges ? ", 5 edges" : ""), &p.whole, exact, 4 * PTI_2_M24 * exact,
+    p = pictures(&s, d, RENDERS, 1000u + 10000u * (uint64_t)kind, 1 + by_tree);
+    pt_check_mean(label("%s, rho %g, %s%s%s", furnace_names[kind], rho, method, max_edges ? ", 5 edges" : "", by_tree ? ", by its tree" : ""), &p.whole, exact, 4 * PTI_2_M24 * exact,
                   bound, PT_TEST_MEANS, "light is lost or counted twice");
     pt_scene_free(&s.scene);
 }
@@ -137,12 +140,13 @@ static void furnaces(void)
     int kind;
     pt_test_source("a closed scene that emits 1 and reflects rho: 1/(1 - rho)");
     for (kind = 0; kind < TOUCHING; kind++) {
-        furnace_mean(kind, 0.5, "path", 0, 120, 0.006);
-        furnace_mean(kind, 0.9, "path", 5, 60, 0.006);
-        if (kind == BOX || kind == SHELLS) furnace_mean(kind, 0.9, "path", 0, 60, 0.01);
-        if (kind == BOX || kind == FANS || kind == SHELLS) furnace_mean(kind, 0.5, "path-plain", 0, 120, 0.006);
-        if (kind == BOX) furnace_mean(kind, 0.999, "path", 0, 1, 0.1);
-        if (kind == FANS) furnace_mean(kind, 0.999, "path-plain", 0, 1, 0.1);
+        furnace_mean(kind, 0.5, "path", 0, 120, 0.006, 0);
+        furnace_mean(kind, 0.9, "path", 5, 60, 0.006, 0);
+        if (kind == BOX || kind == SHELLS) furnace_mean(kind, 0.9, "path", 0, 60, 0.01, 0);
+        if (kind == BOX || kind == FANS || kind == SHELLS) furnace_mean(kind, 0.5, "path-plain", 0, 120, 0.006, 0);
+        if (kind == BOX) furnace_mean(kind, 0.999, "path", 0, 1, 0.1, 0);
+        if (kind == FANS) furnace_mean(kind, 0.999, "path-plain", 0, 1, 0.1, 0);
+        if (kind == TURNED || kind == THINGS || kind == SHELLS) furnace_mean(kind, 0.5, "path", 0, 60, 0.01, 1);
     }
 }
 
@@ -318,7 +322,7 @@ static int stop_progress(void *user, const pt_progress *p) { return ++*(int *)us
 /* Walls that lose nothing: a path has some 2^24 edges and more. Neither a poll, a callback nor a budget waits for its end. */
 static void endless(void)
 {
-    stage s = furnace(BALL, 1);
+    stage s = furnace(BALL, 1, 0);
     pt_render_desc d = desc_of(&s, 16, 16, 4);
     int way;
     for (way = 0; way < 4; way++) {
@@ -1339,23 +1343,22 @@ static void nobody(void *user, const char *word, int edges, pt_rgbd value)
 }
 
 enum {
-    EYE, PART, TEXTURE, SKY, MAP, POINT, SPOT, SUN, ROUGH, METAL, INDEX, COAT, GLASS, NORMALS, LPE, OBSERVER, GENERAL, STRATIFIED, MANY, DIM, WHITTED, LONG_PATHS,
+    TEXTURE, SKY, MAP, POINT, SPOT, SUN, ROUGH, METAL, INDEX, COAT, GLASS, LPE, OBSERVER, GENERAL, STRATIFIED, MANY, DIM, WHITTED, LONG_PATHS,
     LATE, SWITCH, REFUSED
 };
 static const char *const refused_names[REFUSED] = {
-    "an eye far off", "a tiny part", "a texture", "a sky", "an environment image", "a point light", "a spot light", "a directional light", "rough diffuse",
-    "metal too smooth for floats", "metal of a huge index", "a coat", "rough glass", "shading normals", "light-path expressions", "an observer", "the general body", "the stratified sampler",
-    "65 primitives", "a light too dim for 24 bits", "another method", "paths of 2^24 edges", "roulette from 2^24 on", "no_lockstep"};
+    "a texture", "a sky", "an environment image", "a point light", "a spot light", "a directional light", "rough diffuse",
+    "metal too smooth for floats", "metal of a huge index", "a coat", "rough glass", "light-path expressions", "an observer", "the general body", "the stratified sampler",
+    "65 lamps", "a light too dim for 24 bits", "another method", "paths of 2^24 edges", "roulette from 2^24 on", "no_lockstep"};
 
 static void add_refused(stage *s, int what)
 {
     static const pt_texture checker = {PT_TEXTURE_CHECKER, NULL, 0, 0, {8, 8}, {(pt_real)0.25, (pt_real)0.25, (pt_real)0.25},
                                        {(pt_real)0.75, (pt_real)0.75, (pt_real)0.75}, NULL, NULL};
     static const float sky[6] = {1, 1, 1, 0.5f, 0.5f, 2};
-    const pt_vec3 corner[3] = {{0, 0, 0}, {(pt_real)0.3, 0, 0}, {0, (pt_real)0.3, 0}}, up[3] = {{0, 0, 1}, {(pt_real)0.1, 0, 1}, {0, 0, 1}};
-    const uint32_t index[3] = {0, 1, 2};
     pt_material m = pt_material_diffuse(grey(0.5));
-    int k;
+    int k, i;
+    if (what == MANY) m.emission = grey(1);
     if (what == TEXTURE) m.texture = &checker;
     if (what == ROUGH) m = pt_material_oren_nayar(grey(0.5), (pt_real)0.3);
     if (what == METAL) m = pt_material_conductor(grey(1), grey(3), (pt_real)0.022);
@@ -1364,9 +1367,8 @@ static void add_refused(stage *s, int what)
     if (what == GLASS) m = pt_material_rough_dielectric((pt_real)1.5, (pt_real)0.2);
     if (what == DIM) m.emission = grey(1e-9);
     k = pt_add_material(&s->scene, m);
-    if (what == NORMALS) pt_add_mesh(&s->scene, corner, up, NULL, 3, index, 1, k);
-    else add_ball(&s->scene, &HERE, 0, 0.4, 0, what == PART ? 0.001 : what == DIM ? 0.01 : 0.2, k);
-    for (k = 0; what == MANY && k < 65; k++) add_ball(&s->scene, &HERE, -0.9 + 0.2 * (k % 8), -0.9, -0.9 + 0.2 * (k / 8), 0.05, 0);
+    add_ball(&s->scene, &HERE, 0, 0.4, 0, what == DIM ? 0.01 : 0.2, k);
+    for (i = 0; what == MANY && i < 65; i++) add_ball(&s->scene, &HERE, -0.9 + 0.2 * (i % 8), -0.9, -0.9 + 0.2 * (i / 8), 0.05, k);
     if (what == SKY) pt_set_environment(&s->scene, grey(1));
     if (what == MAP) pt_set_environment_image(&s->scene, sky, 2, 1, 1);
     if (what == POINT) pt_add_point_light(&s->scene, v3(0, 0.7, 0), grey(1));
@@ -1386,7 +1388,6 @@ static void refused(void)
         add_refused(&s, what);
         commit(&s);
         d = desc_of(&s, 12, 9, 2);
-        if (what == EYE) d.camera = pt_camera_look_at(v3(0, 0, 20000), v3(0, 0, 0), v3(0, 1, 0), (pt_real)0.01);
         if (what == LPE && pt_lpe_compile(&lpe, words, 1, NULL) == PT_OK) d.li.lpe = &lpe;
         if (what == OBSERVER) d.li.observer = nobody;
         d.general_body = what == GENERAL;
@@ -1444,14 +1445,15 @@ static void layers(void)
 static void taken(void)
 {
     int what;
-    for (what = 0; what < 6; what++) {
+    for (what = 0; what < 9; what++) { /* the last three by the tree */
         stage s = room(SPHERES);
         pt_render_desc d;
         pt_film film;
         int k;
         if (what == 0) add_ball(&s.scene, &HERE, 0, 0.4, 0, 0.00125, 0); /* 2048 e = 0.0021 */
         if (what == 5) add_ball(&s.scene, &HERE, 0, 0.4, 0, 0.1, pt_add_material(&s.scene, pt_material_conductor(grey(1), grey(9e5), (pt_real)0.0222)));
-        while (what == 1 && s.scene.sphere_count + s.scene.parallelogram_count + s.scene.triangle_count < 64) {
+        if (what == 6) add_ball(&s.scene, &HERE, 0, 0.4, 0, 0.001, 0);
+        while ((what == 1 || what == 7) && s.scene.sphere_count + s.scene.parallelogram_count + s.scene.triangle_count < (what == 1 ? 64 : 65)) {
             k = (int)s.scene.sphere_count;
             add_ball(&s.scene, &HERE, -0.9 + 0.2 * (k % 8), -0.9, -0.9 + 0.2 * (k / 8), 0.05, 0);
         }
@@ -1460,7 +1462,8 @@ static void taken(void)
         if (what == 2) d.camera = pt_camera_look_at(v3(0, 0, 1000), v3(0, 0, 0), v3(0, 1, 0), (pt_real)0.1);
         if (what == 3) d.li.max_edges = (1 << 24) - 1;
         if (what == 4) d.sampler = PT_SAMPLER_INDEPENDENT;
-        film = render(&s, &d, 1, NULL);
+        if (what == 8) d.camera = pt_camera_look_at(v3(0, 0, 20000), v3(0, 0, 0), v3(0, 1, 0), (pt_real)0.01);
+        film = render(&s, &d, what >= 6 ? 2 : 1, NULL);
         if (pt_test.is_verbose) printf("       taken, way %d\n", what);
         pt_film_free(&film);
         pt_scene_free(&s.scene);
