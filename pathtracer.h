@@ -5355,8 +5355,8 @@ PTI_INLINE8 pti_f8 pti_depth_lanes(const pti_edges8 *e, const pti_ray *r, const 
     return pti_f8_flip(depth, sum);
 }
 
-/* Which of eight triangles may be hit by the limit? *sure, where it is asked for: which certainly are; both bounds are at
-   least 100 times what pti_depth_error allows for. */
+/* Which of eight triangles may be hit by the limit? *sure: which certainly are; both bounds are at least 100 times what
+   pti_depth_error allows for. */
 PTI_INLINE unsigned pti_triangle_lanes(const pti_triangle8 *p, const pti_ray *r, const pti_ray8 *w, float limit, unsigned *sure)
 {
     const pti_edges8 e = pti_edge_lanes(p, r, w);
@@ -5367,13 +5367,11 @@ PTI_INLINE unsigned pti_triangle_lanes(const pti_triangle8 *p, const pti_ray *r,
         pti_f8 det, off;
         const pti_f8 depth = pti_depth_lanes(&e, r, w, &det, &off);
         const pti_f8 before = pti_f8_sub(pti_f8_madd(det, pti_f8_set(end), off), depth);
+        const pti_f8 last = pti_f8_mul(det, pti_f8_set(pti_ray8_before(limit) * flat)); /* det 0: may be NaN, not sure */
+        const pti_f8 clear = pti_f8_sub(pti_f8_min(depth, pti_f8_sub(last, depth)), pti_f8_add(off, off));
+        const pti_f8 inside = pti_f8_sub(pti_f8_max(e.low, pti_f8_sub(zero, e.high)), e.error);
         lanes &= pti_m8_bits(pti_f8_le(zero, pti_f8_min(before, pti_f8_add(depth, off))));
-        if (sure) {
-            const pti_f8 last = pti_f8_mul(det, pti_f8_set(pti_ray8_before(limit) * flat)); /* det 0: may be NaN, not sure */
-            const pti_f8 clear = pti_f8_sub(pti_f8_min(depth, pti_f8_sub(last, depth)), pti_f8_add(off, off));
-            const pti_f8 inside = pti_f8_sub(pti_f8_max(e.low, pti_f8_sub(zero, e.high)), e.error);
-            *sure = pti_m8_bits(pti_f8_lt(zero, pti_f8_min(inside, clear)));
-        }
+        *sure = pti_m8_bits(pti_f8_lt(zero, pti_f8_min(inside, clear)));
     }
     return lanes;
 }
@@ -5450,27 +5448,49 @@ PTI_INLINE pti_d3 pti_shear_lane(const pti_ray *r, const float *v)
     return pti_shear_axes(r, v[8 * r->kx], v[8 * r->ky], v[8 * r->kz]);
 }
 
+/* Keeps what is hit for certain, if it is nearer than the best: the numbers of pti_sheared_triangle without its questions.
+   half: 1 or 2 for the halves of a parallelogram, with its u and v; 0 for a triangle. */
+PTI_INLINE int pti_keep_sure(pti_d3 a, pti_d3 b, pti_d3 c, int half, int id, pti_best *best)
+{
+    const double u = pti_edge(c.x, b.y, c.y, b.x), v = pti_edge(a.x, c.y, a.y, c.x), w = pti_edge(b.x, a.y, b.y, a.x);
+    const double det = u + v + w;
+    double p = u * a.z, q = v * b.z, depth = w * c.z, b1, b2;
+    PTI_FENCE(p);
+    PTI_FENCE(q);
+    PTI_FENCE(depth);
+    depth = (depth + (p + q)) / det;
+    if (!(depth < pti_before(best, id))) return 0;
+    b1 = v / det;
+    b2 = w / det;
+    return pti_keep(best, id, depth, half == 1 ? b1 + b2 : b1, half == 2 ? b1 + b2 : b2);
+}
+
 /* Tests a lane as pti_test does; the corners of a triangle are at hand. */
-PTI_INLINE int pti_test_lane(const pt_scene *scene, const pti_ray *r, const pti_triangle8 *p, int i, pti_best *best)
+PTI_INLINE int pti_test_lane(const pt_scene *scene, const pti_ray *r, const pti_triangle8 *p, int i, int sure, pti_best *best)
 {
     const int id = (int)p->id[i];
+    pti_d3 a, b, c;
     double t, u, v;
     if (id >= (int)scene->wide.triangles) return pti_test(scene, r, id, best);
-    return pti_sheared_triangle(r, pti_shear_lane(r, &p->v[0][i]), pti_shear_lane(r, &p->v[3][i]), pti_shear_lane(r, &p->v[6][i]),
-                                pti_before(best, id), &t, &u, &v) && pti_keep(best, id, t, u, v);
+    a = pti_shear_lane(r, &p->v[0][i]);
+    b = pti_shear_lane(r, &p->v[3][i]);
+    c = pti_shear_lane(r, &p->v[6][i]);
+    if (sure) return pti_keep_sure(a, b, c, 0, id, best);
+    return pti_sheared_triangle(r, a, b, c, pti_before(best, id), &t, &u, &v) && pti_keep(best, id, t, u, v);
 }
 
 PTI_INLINE int pti_test_leaf(const pt_scene *scene, uint32_t leaf, const pti_ray *r, const pti_ray8 *w, float limit, pti_best *best, int any)
 {
     const void *p = pti_place(&scene->wide, leaf);
     const int flat = (leaf & 7) == PTI_TRIANGLES;
-    unsigned sure = 0, lanes = flat ? pti_triangle_lanes((const pti_triangle8 *)p, r, w, limit, any ? &sure : NULL)
+    unsigned sure = 0, lanes = flat ? pti_triangle_lanes((const pti_triangle8 *)p, r, w, limit, &sure)
                                     : pti_m8_bits(pti_f8_le(pti_sphere_lanes((const pti_sphere8 *)p, w), pti_f8_set(limit)));
     int found = 0;
     if (any && sure) return 1;
     for (; lanes; lanes &= lanes - 1) {
         const int i = pti_lowest_bit(lanes);
-        found |= flat ? pti_test_lane(scene, r, (const pti_triangle8 *)p, i, best) : pti_test(scene, r, (int)((const pti_sphere8 *)p)->id[i], best);
+        found |= flat ? pti_test_lane(scene, r, (const pti_triangle8 *)p, i, sure >> i & 1, best)
+                      : pti_test(scene, r, (int)((const pti_sphere8 *)p)->id[i], best);
         if (any && found) return 1;
     }
     return found;
@@ -5530,11 +5550,11 @@ typedef struct pti_plane8 {
     float both[8];          /* 1 for a parallelogram, else 0                                               */
 } pti_plane8;
 
-/* What to test: a flat primitive with its corners or, with 0 of them, a sphere. */
+/* What to test: a primitive and, of a flat one, the corners of it or of a half. */
 typedef struct pti_tested {
-    pt_vec3 corner[4];
-    int corners, id;
-    uint32_t unused[2];
+    pt_vec3 corner[3];
+    int id, half;           /* 1, 2: of a parallelogram                                                    */
+    uint32_t unused[5];
 } pti_tested;
 
 /* tested[PTI_SMALL + i]: the half of lane i where v > u. */
@@ -5595,18 +5615,23 @@ static uint32_t pti_write_flat(const pt_scene *scene, pti_small *out, uint32_t l
     pti_tested *a = &out->tested[lane], *b = &out->tested[PTI_SMALL + lane];
     pti_plane8 *plane = &out->planes[lane / 8];
     const int there = i < flats;
-    pt_vec3 all[4];
-    a->id = (int)(there ? i : flats - 1);
-    a->corners = pti_corners(scene, &scene->primitives[a->id], a->corner);
-    *b = *a;
-    if (a->corners == 3 && i + 1 < flats && pti_corners(scene, &scene->primitives[i + 1], b->corner) == 3 &&
-        pti_is_parallelogram(a->corner, b->corner, (double)scene->wide.extent, all)) {
+    pt_vec3 c[4], d[4], all[4];
+    int corners;
+    a->id = b->id = (int)(there ? i : flats - 1);
+    corners = pti_corners(scene, &scene->primitives[a->id], c);
+    a->half = corners == 4 ? 1 : 0;
+    b->half = 2 * a->half;
+    memcpy(a->corner, c, sizeof a->corner);
+    memcpy(b->corner, c, sizeof b->corner);
+    if (b->half) memcpy(b->corner + 1, c + 2, 2 * sizeof *c);
+    if (corners == 3 && i + 1 < flats && pti_corners(scene, &scene->primitives[i + 1], d) == 3 &&
+        pti_is_parallelogram(c, d, (double)scene->wide.extent, all)) {
         b->id++;
+        memcpy(b->corner, d, sizeof b->corner);
         pti_write_plane(plane, lane % 8, all, 4, 1);
         return 2;
     }
-    *b = *a;
-    pti_write_plane(plane, lane % 8, a->corner, a->corners, there);
+    pti_write_plane(plane, lane % 8, c, corners, there);
     return 1;
 }
 
@@ -5623,8 +5648,7 @@ static int pti_build_small(const pt_scene *scene, pt_wide *wide, uint32_t flats)
     wide->plane_blocks = (int)(lane / 8);
     for (i = 0; flats + i < count || i % 8 > 0; i++, lane++) {
         const uint32_t id = flats + i < count ? flats + i : count - 1;
-        out->tested[lane].id = (int)id;
-        out->tested[lane].corners = 0;
+        out->tested[lane].id = out->tested[PTI_SMALL + lane].id = (int)id;
         pti_write_sphere(scene, &out->spheres[i / 8], i % 8, id, flats + i < count);
     }
     wide->sphere_blocks = (int)(i / 8);
@@ -5653,16 +5677,15 @@ PTI_INLINE pti_f8 pti_dot8(const float rows[4][8], pti_f8 x, pti_f8 y, pti_f8 z,
     return pti_f8_madd(pti_f8_load(rows[0]), x, pti_f8_madd(pti_f8_load(rows[1]), y, pti_f8_madd(pti_f8_load(rows[2]), z, w)));
 }
 
-/* What eight planes say: where they begin, as spheres do; v - u; a bound of the error of u, of v and of w; and, > 0: it is hit
-   for certain, within the limit. */
+/* What eight planes say: t and how far it may be off; the least weight, v - u, and a bound of the error of u, of v and of w. */
 typedef struct pti_planes8 {
-    pti_f8 start, more, error, margin;
+    pti_f8 t, off, inside, more, error;
 } pti_planes8;
 
 /* n.o + n3 is off by 36 u S (9 of these for the rounded corners of a parallelogram), n.d by 14 u m, so t by X = 96 u S / |n.d|.
    As |n.d| <= m, m X is at least 96 u S: so u, v and w are off by at most 3 G m X. Nothing is said of a lane where n is
    not known or where numbers overflow: NaN is not < 0. */
-PTI_INLINE8 pti_planes8 pti_plane_lanes(const pti_plane8 *p, const pti_ray8 *w, float limit, int any)
+PTI_INLINE8 pti_planes8 pti_plane_lanes(const pti_plane8 *p, const pti_ray8 *w)
 {
     const pti_f8 ox = pti_f8_set(w->o[0]), oy = pti_f8_set(w->o[1]), oz = pti_f8_set(w->o[2]), zero = pti_f8_set(0);
     const pti_f8 dx = pti_f8_set(w->d[0]), dy = pti_f8_set(w->d[1]), dz = pti_f8_set(w->d[2]), one = pti_f8_set(1);
@@ -5671,37 +5694,49 @@ PTI_INLINE8 pti_planes8 pti_plane_lanes(const pti_plane8 *p, const pti_ray8 *w, 
     const pti_f8 u = pti_f8_madd(t, pti_dot8(p->u, dx, dy, dz, zero), pti_dot8(p->u, ox, oy, oz, pti_f8_load(p->u[3])));
     const pti_f8 v = pti_f8_madd(t, pti_dot8(p->v, dx, dy, dz, zero), pti_dot8(p->v, ox, oy, oz, pti_f8_load(p->v[3])));
     const pti_f8 less = pti_f8_min(u, v), rest = pti_f8_madd(pti_f8_load(p->both), less, pti_f8_sub(pti_f8_sub(one, u), v));
-    const pti_f8 off = pti_f8_mul(pti_f8_abs(inverse), pti_f8_set(96 * PTI_U * w->span)), inside = pti_f8_min(less, rest);
     pti_planes8 h;
+    h.t = t;
+    h.off = pti_f8_mul(pti_f8_abs(inverse), pti_f8_set(96 * PTI_U * w->span));
+    h.inside = pti_f8_min(less, rest);
     h.more = pti_f8_sub(v, u);
-    h.error = pti_f8_mul(off, pti_f8_mul(pti_f8_load(p->steep), pti_f8_set(3 * w->reach)));
-    h.start = pti_f8_max(pti_f8_sub(t, off), pti_f8_set(PTI_SOON));
-    h.start = pti_f8_select(pti_f8_lt(pti_f8_min(pti_f8_add(inside, h.error), pti_f8_add(t, off)), zero), pti_f8_set(PTI_NEVER), h.start);
-    h.margin = zero;
-    if (any) {
-        const pti_f8 clear = pti_f8_mul(h.error, pti_f8_set(2 * w->span / w->reach)), end = pti_f8_set(pti_ray8_before(limit));
-        h.margin = pti_f8_sub(pti_f8_min(t, pti_f8_sub(end, t)), clear);
-        h.margin = pti_f8_min(h.margin, pti_f8_sub(inside, pti_f8_add(h.error, h.error)));
-    }
+    h.error = pti_f8_mul(h.off, pti_f8_mul(pti_f8_load(p->steep), pti_f8_set(3 * w->reach)));
     return h;
 }
 
-/* x >= 0 with its lowest seven bits replaced by a tag below 64, and by 64 more where m holds. */
-PTI_INLINE pti_f8 pti_f8_tag(pti_f8 x, const uint32_t *tag, pti_m8 m)
+/* Where they begin, as spheres do. */
+PTI_INLINE pti_f8 pti_plane_starts(const pti_planes8 *h)
+{
+    const pti_f8 seen = pti_f8_min(pti_f8_add(h->inside, h->error), pti_f8_add(h->t, h->off));
+    return pti_f8_select(pti_f8_lt(seen, pti_f8_set(0)), pti_f8_set(PTI_NEVER), pti_f8_max(pti_f8_sub(h->t, h->off), pti_f8_set(PTI_SOON)));
+}
+
+/* Which may be hit by the limit? *margin > 0: is hit for certain. A hit is at t <= 3 S / m, and 2 G S >= 1, for no edge is
+   longer than 2 S along an axis: so what t must be clear of, 2 S / m times the error of weights, is at least 288 u S / m and
+   3 X, which is more than the limit was rounded by. */
+PTI_INLINE unsigned pti_planes_within(const pti_planes8 *h, const pti_ray8 *w, float limit, pti_f8 *margin)
+{
+    const pti_f8 within = pti_f8_min(h->t, pti_f8_sub(pti_f8_set(limit), h->t));
+    const pti_f8 seen = pti_f8_min(pti_f8_add(h->inside, h->error), pti_f8_add(within, h->off));
+    const pti_f8 clear = pti_f8_nmadd(h->error, pti_f8_set(2 * w->span / w->reach), within);
+    *margin = pti_f8_min(clear, pti_f8_nmadd(h->error, pti_f8_set(2), h->inside));
+    return 255 ^ pti_m8_bits(pti_f8_lt(seen, pti_f8_set(0)));
+}
+
+/* x >= 0 with its lowest seven bits replaced by a tag. */
+PTI_INLINE pti_f8 pti_f8_tag(pti_f8 x, const uint32_t *tag)
 {
 #if PTI_LANES == 2
-    const __m256 high = _mm256_castsi256_ps(_mm256_set1_epi32(~127)), more = _mm256_castsi256_ps(_mm256_set1_epi32(64));
-    return _mm256_or_ps(_mm256_or_ps(_mm256_and_ps(x, high), _mm256_and_ps(m, more)), pti_f8_load((const float *)(const void *)tag));
+    const __m256 high = _mm256_castsi256_ps(_mm256_set1_epi32(~127));
+    return _mm256_or_ps(_mm256_and_ps(x, high), pti_f8_load((const float *)(const void *)tag));
 #elif PTI_LANES == 1
-    const __m128 high = _mm_castsi128_ps(_mm_set1_epi32(~127)), more = _mm_castsi128_ps(_mm_set1_epi32(64));
+    const __m128 high = _mm_castsi128_ps(_mm_set1_epi32(~127));
     const pti_f8 t = pti_f8_load((const float *)(const void *)tag);
-    return pti_f8_pair(_mm_or_ps(_mm_or_ps(_mm_and_ps(x.a, high), _mm_and_ps(m.a, more)), t.a),
-                       _mm_or_ps(_mm_or_ps(_mm_and_ps(x.b, high), _mm_and_ps(m.b, more)), t.b));
+    return pti_f8_pair(_mm_or_ps(_mm_and_ps(x.a, high), t.a), _mm_or_ps(_mm_and_ps(x.b, high), t.b));
 #else
     uint32_t bits[8];
     int i;
     memcpy(bits, x.v, sizeof bits);
-    for (i = 0; i < 8; i++) bits[i] = (bits[i] & ~(uint32_t)127) | ((uint32_t)m.v[i] & 64) | tag[i];
+    for (i = 0; i < 8; i++) bits[i] = (bits[i] & ~(uint32_t)127) | tag[i];
     memcpy(x.v, bits, sizeof bits);
     return x;
 #endif
@@ -5710,71 +5745,101 @@ PTI_INLINE pti_f8 pti_f8_tag(pti_f8 x, const uint32_t *tag, pti_m8 m)
 /* The latest start of what is hit by a limit: 127 units of the last place are at most 2^-16 of it. */
 PTI_INLINE float pti_last_start(float limit) { return limit + limit * (256 * PTI_U); }
 
-/* Where the lanes begin, block by block. The lowest seven bits of a start are the entry that is to be tested: so no two are
+/* Where the lanes begin, block by block, and what planes say. The lowest seven bits of a start are its lane: so no two are
    equal, and the least of them says who it is. */
 typedef struct pti_starts {
-    pti_lanes t[PTI_SMALL / 8], more[PTI_SMALL / 8], error[PTI_SMALL / 8];
-    int count;
+    pti_lanes t[PTI_SMALL / 8], inside[PTI_SMALL / 8], more[PTI_SMALL / 8], error[PTI_SMALL / 8];
+    int planes, count;
 } pti_starts;
 
-/* The first start behind `last`. */
-PTI_INLINE float pti_next_start(const pti_starts *s, float last)
+/* The first start behind `last`; what is beyond the limit is not looked for. */
+PTI_INLINE float pti_next_start(const pti_starts *s, float last, float limit)
 {
     const pti_f8 none = pti_f8_set(HUGE_VALF), from = pti_f8_set(last);
     pti_f8 least = none;
     int i;
     for (i = 0; i < s->count; i++) least = pti_f8_min(least, pti_f8_select(pti_f8_lt(from, s->t[i].f), s->t[i].f, none));
-    return pti_f8_least(least);
+    return pti_m8_bits(pti_f8_le(least, pti_f8_set(limit))) ? pti_f8_least(least) : HUGE_VALF;
 }
 
-/* Tests the entry that a start tells of and, near the diagonal of two triangles, the other, too. */
-PTI_INLINE int pti_test_start(const pt_scene *scene, const pti_ray *r, const pti_starts *s, float start, pti_best *best)
+/* Tests all of a lane. */
+static int pti_test_both(const pt_scene *scene, const pti_ray *r, const pti_tested *e, pti_best *best)
 {
-    const pti_small *small = (const pti_small *)(const void *)scene->wide.arena;
-    const pti_tested *e;
-    uint32_t at;
-    int hit;
-    memcpy(&at, &start, sizeof at);
-    at %= 2 * PTI_SMALL;
-    e = &small->tested[at];
-    if (e->corners == 0) return pti_test(scene, r, e->id, best);
-    hit = pti_test_flat(r, e->corner, e->corners, e->id, best);
-    if (fabsf(s->more[at % PTI_SMALL / 8].v[at % 8]) > 2 * s->error[at % PTI_SMALL / 8].v[at % 8]) return hit;
-    e = &small->tested[at ^ PTI_SMALL];
-    return hit | pti_test_flat(r, e->corner, e->corners, e->id, best);
+    const int hit = pti_test(scene, r, e->id, best);
+    return e[PTI_SMALL].id == e->id ? hit : hit | pti_test(scene, r, e[PTI_SMALL].id, best);
 }
 
-PTI_INLINE int pti_search_small(const pt_scene *scene, const pti_ray *r, const pti_ray8 *w, pti_best *best, int any)
+/* Tests the lane that a start tells of: only the half that is hit, where that is certain, as pti_planes_within has it; t is
+   less than 1.4 times the start then, and end, from where no hit was known, not near. */
+PTI_INLINE int pti_test_start(const pt_scene *scene, const pti_ray *r, const pti_ray8 *w, const pti_starts *s, float start, float end, pti_best *best)
+{
+    const pti_tested *e = ((const pti_small *)(const void *)scene->wide.arena)->tested;
+    uint32_t lane;
+    memcpy(&lane, &start, sizeof lane);
+    lane %= PTI_SMALL;
+    e += lane;
+    if ((int)lane / 8 < s->planes) {
+        const float more = s->more[lane / 8].v[lane % 8], error = 2 * s->error[lane / 8].v[lane % 8];
+        if (s->inside[lane / 8].v[lane % 8] > error && fabsf(more) > error && start * w->reach > error * w->span && 2 * start < end) {
+            if (more > 0) e += PTI_SMALL;
+            return pti_keep_sure(pti_shear(r, &e->corner[0]), pti_shear(r, &e->corner[1]), pti_shear(r, &e->corner[2]), e->half, e->id, best);
+        }
+    }
+    return pti_test_both(scene, r, e, best);
+}
+
+PTI_INLINE int pti_nearest_small(const pt_scene *scene, const pti_ray *r, const pti_ray8 *w, pti_best *best)
 {
     const pti_small *small = (const pti_small *)(const void *)scene->wide.arena;
     const int planes = scene->wide.plane_blocks, spheres = scene->wide.sphere_blocks;
     const float end = pti_ray8_limit(w, best->t);
-    const pti_f8 zero = pti_f8_set(0);
-    pti_f8 least = pti_f8_set(HUGE_VALF), margin = zero;
+    pti_f8 least = pti_f8_set(HUGE_VALF);
     pti_starts s;
     float start, limit = pti_last_start(end);
     int found = 0, i;
     for (i = 0; i < planes; i++) {
-        const pti_planes8 h = pti_plane_lanes(&small->planes[i], w, end, any);
-        s.t[i].f = pti_f8_tag(h.start, small->tag + 8 * i, pti_f8_lt(zero, h.more));
+        const pti_planes8 h = pti_plane_lanes(&small->planes[i], w);
+        s.t[i].f = pti_f8_tag(pti_plane_starts(&h), small->tag + 8 * i);
+        s.inside[i].f = h.inside;
         s.more[i].f = h.more;
         s.error[i].f = h.error;
         least = pti_f8_min(least, s.t[i].f);
-        margin = pti_f8_max(h.margin, margin);
     }
-    if (any && pti_m8_bits(pti_f8_lt(zero, margin))) return 1;
     for (i = 0; i < spheres; i++) {
-        s.t[planes + i].f = pti_f8_tag(pti_sphere_lanes(&small->spheres[i], w), small->tag + 8 * (planes + i), pti_f8_lt(zero, zero));
+        s.t[planes + i].f = pti_f8_tag(pti_sphere_lanes(&small->spheres[i], w), small->tag + 8 * (planes + i));
         least = pti_f8_min(least, s.t[planes + i].f);
     }
+    s.planes = planes;
     s.count = planes + spheres;
-    for (start = pti_f8_least(least); start <= limit; start = pti_next_start(&s, start)) {
-        if (!pti_test_start(scene, r, &s, start, best)) continue;
-        if (any) return 1;
+    for (start = pti_f8_least(least); start <= limit; start = pti_next_start(&s, start, limit)) {
+        if (!pti_test_start(scene, r, w, &s, start, end, best)) continue;
         found = 1;
         limit = pti_last_start(pti_ray8_limit(w, best->t));
     }
     return found;
+}
+
+PTI_INLINE int pti_any_small(const pt_scene *scene, const pti_ray *r, const pti_ray8 *w, pti_best *best)
+{
+    const pti_small *small = (const pti_small *)(const void *)scene->wide.arena;
+    const int planes = scene->wide.plane_blocks, spheres = scene->wide.sphere_blocks;
+    const float end = pti_ray8_limit(w, best->t);
+    pti_f8 sure = pti_f8_set(0), margin;
+    uint64_t may = 0;
+    int i;
+    for (i = 0; i < planes; i++) {
+        const pti_planes8 h = pti_plane_lanes(&small->planes[i], w);
+        may |= (uint64_t)pti_planes_within(&h, w, end, &margin) << 8 * i;
+        sure = pti_f8_max(margin, sure);
+    }
+    if (pti_m8_bits(pti_f8_lt(pti_f8_set(0), sure))) return 1;
+    for (i = 0; i < spheres; i++)
+        may |= (uint64_t)pti_m8_bits(pti_f8_le(pti_sphere_lanes(&small->spheres[i], w), pti_f8_set(end))) << 8 * (planes + i);
+    for (; may; may &= may - 1) {
+        const int lane = (uint32_t)may ? pti_lowest_bit((uint32_t)may) : 32 + pti_lowest_bit((uint32_t)(may >> 32));
+        if (pti_test_both(scene, r, &small->tested[lane], best)) return 1;
+    }
+    return 0;
 }
 
 /* What pti_search calls: the nearest hit or any; -1: not a ray for lanes. */
@@ -5782,7 +5847,7 @@ PTI_INLINE int pti_search_wide(const pt_scene *scene, const pti_ray *r, pti_best
 {
     pti_ray8 w;
     if (!pti_ray8_make(&w, r, scene->wide.extent)) return -1;
-    if (scene->wide.plane_blocks + scene->wide.sphere_blocks > 0) return pti_search_small(scene, r, &w, best, any);
+    if (scene->wide.plane_blocks + scene->wide.sphere_blocks > 0) return any ? pti_any_small(scene, r, &w, best) : pti_nearest_small(scene, r, &w, best);
     pti_ray8_for_tree(&w, r);
     return pti_traverse_wide(scene, r, &w, best, any);
 }
