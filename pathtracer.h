@@ -4825,6 +4825,7 @@ typedef struct pti_sphere8 {
 #define PTI_PIECES 256
 #define PTI_WIDE_DEPTH 32   /* deeper down lists are halved, and end within 28 levels                      */
 #define PTI_WALL 0.1f       /* a leaf of more than a 30th of the surface of a cube around the scene is cut where that pays */
+#define PTI_FEW 64          /* for lists that are shorter, half of the bins do                             */
 
 /* Some boxes joined, and {-least, greatest} of twice their centres. */
 typedef struct pti_joined {
@@ -4852,16 +4853,17 @@ typedef struct pti_wide_builder {
     unsigned char *arena;   /* NULL while bytes are counted                                                */
     size_t used;            /* bytes of it                                                                 */
     pti_counter next;       /* node                                                                        */
-    float scale;            /* of lengths: keeps areas in range                                            */
+    float wall;             /* half of the surface of a wall                                               */
     uint32_t triangles, flats; /* lanes below these hold triangles, triangles and halves                   */
     uint32_t piece_size;
     int piece_count;
     pti_piece pieces[PTI_PIECES];
 } pti_wide_builder;
 
-static float pti_scaled_area(const pti_wide_builder *b, const float *v)
+/* Half of the surface of a box; with coordinates below 2^39 and counts below 2^29 no sum of costs overflows. */
+PTI_INLINE float pti_box_area(const float *v)
 {
-    const float x = (v[4] + v[0]) * b->scale, y = (v[5] + v[1]) * b->scale, z = (v[6] + v[2]) * b->scale;
+    const float x = v[4] + v[0], y = v[5] + v[1], z = v[6] + v[2];
     return x * y + y * z + z * x;
 }
 
@@ -4877,25 +4879,25 @@ typedef struct pti_wide_bins {
     uint32_t count[PTI_WIDE_BINS];
 } pti_wide_bins;
 
-/* The best plane between the bins of an axis, if it is better than *best; `few` boxes at least on each side. */
-static void pti_sweep_blocks(const pti_wide_builder *b, const pti_wide_bins *bins, uint32_t few, pti_parting p, pti_parting *best)
+/* The best plane between `count` bins of an axis, if it is better than *best; `few` boxes at least on each side. */
+static void pti_sweep_blocks(const pti_wide_bins *bins, int count, uint32_t few, pti_parting p, pti_parting *best)
 {
     float right[PTI_WIDE_BINS];
     pti_lanes box;
     uint32_t n = 0;
     int i;
     box.f = pti_f8_set(-HUGE_VALF);
-    for (i = PTI_WIDE_BINS - 1; i > 0; i--) {
+    for (i = count - 1; i > 0; i--) {
         box.f = pti_f8_max(box.f, bins->box[i].f);
         n += bins->count[i];
-        right[i] = n >= few ? pti_scaled_area(b, box.v) * (float)((n + 7) / 8) : HUGE_VALF;
+        right[i] = n >= few ? pti_box_area(box.v) * (float)((n + 7) / 8) : HUGE_VALF;
     }
     box.f = pti_f8_set(-HUGE_VALF);
-    for (n = 0, i = 1; i < PTI_WIDE_BINS; i++) {
+    for (n = 0, i = 1; i < count; i++) {
         box.f = pti_f8_max(box.f, bins->box[i - 1].f);
         n += bins->count[i - 1];
         if (n < few) continue;
-        p.cost = pti_scaled_area(b, box.v) * (float)((n + 7) / 8) + right[i];
+        p.cost = pti_box_area(box.v) * (float)((n + 7) / 8) + right[i];
         p.plane = (float)i;
         if (p.cost < best->cost) *best = p;
     }
@@ -4904,32 +4906,39 @@ static void pti_sweep_blocks(const pti_wide_builder *b, const pti_wide_bins *bin
 /* Improves on *best, a halving of infinite cost, if the centres differ. */
 static void pti_find_parting(const pti_wide_builder *b, uint32_t begin, uint32_t end, const float *centres, uint32_t few, pti_parting *best)
 {
+    const int count = end - begin < PTI_FEW ? PTI_WIDE_BINS / 2 : PTI_WIDE_BINS;
     pti_wide_bins bins[3];
     pti_parting p[3];
+    pti_lanes from, scale;  /* of lanes 4 to 6; the others take numbers that cost no time                  */
     uint32_t i;
     int k, j;
+    from.f = pti_f8_set(1);
+    scale.f = pti_f8_set(0);
     for (k = 0; k < 3; k++) {
         const float extent = centres[4 + k] + centres[k];
         p[k] = *best;
         p[k].axis = k;
         p[k].lo = -centres[k];
-        p[k].scale = extent > 1e-30f ? PTI_WIDE_BINS * (1 - 4 * PTI_U) / extent : 0; /* all fall below bin 16 */
-        for (j = 0; j < PTI_WIDE_BINS; j++) {
+        p[k].scale = extent > 1e-30f ? (float)count * (1 - 4 * PTI_U) / extent : 0; /* all fall below the last */
+        from.v[4 + k] = p[k].lo;
+        scale.v[4 + k] = p[k].scale;
+        for (j = 0; j < count; j++) {
             bins[k].box[j].f = pti_f8_set(-HUGE_VALF);
             bins[k].count[j] = 0;
         }
     }
     for (i = begin; i < end; i++) {
         const pti_f8 box = b->boxes[i].f;
-        const float *v = b->boxes[i].v;
+        pti_lanes place;
+        place.f = pti_f8_mul(pti_f8_sub(pti_f8_sub(box, pti_f8_swap(box)), from.f), scale.f);
         for (k = 0; k < 3; k++) {
-            const int bin = (int)((v[4 + k] - v[k] - p[k].lo) * p[k].scale);
+            const int bin = (int)place.v[4 + k];
             bins[k].box[bin].f = pti_f8_max(box, bins[k].box[bin].f);
             bins[k].count[bin]++;
         }
     }
     for (k = 0; k < 3; k++)
-        if (p[k].scale > 0) pti_sweep_blocks(b, &bins[k], few, p[k], best);
+        if (p[k].scale > 0) pti_sweep_blocks(&bins[k], count, few, p[k], best);
 }
 
 /* Moves what goes left to the front, without branches, and joins both sides; returns the first of the right. */
@@ -4971,7 +4980,7 @@ static void pti_collapse(const pti_wide_builder *b, pti_binary *n)
         for (j = 1; j < k; j++)
             if (l[j - 1] + r[k - j - 1] < best[k]) best[k] = l[j - 1] + r[k - j - 1];
     }
-    n->cost[0] = pti_scaled_area(b, box) + best[8];
+    n->cost[0] = pti_box_area(box) + best[8];
     for (k = 2; k <= 7; k++) n->cost[k - 1] = best[k] < n->cost[k - 2] ? best[k] : n->cost[k - 2];
 }
 
@@ -4982,7 +4991,7 @@ static void pti_build_binary(pti_wide_builder *b, uint32_t n, const pti_joined *
 {
     pti_binary *node = &b->nodes[n];
     const uint32_t begin = node->first, end = begin + node->count;
-    const float area = pti_scaled_area(b, all->box.v);
+    const float area = pti_box_area(all->box.v);
     const int mixed = n == 0 && b->flats > 0 && b->flats < end, few = node->count <= 8 && !mixed;
     pti_parting p = {-1, 0, 0, 0, HUGE_VALF, (node->count / 2 + 7) / 8 * 8};
     pti_joined side[2];
@@ -4993,7 +5002,7 @@ static void pti_build_binary(pti_wide_builder *b, uint32_t n, const pti_joined *
     }
     node->child = 0;
     for (k = 0; k < 7; k++) node->cost[k] = area;
-    if (few && (depth >= 8 || area < PTI_WALL)) return;
+    if (few && (depth >= 8 || area < b->wall)) return;
     if (pieces && n > 0 && !few && node->count <= b->piece_size && b->piece_count < PTI_PIECES) {
         const pti_piece piece = {n, depth, *all};
         b->pieces[b->piece_count++] = piece;
@@ -5146,7 +5155,7 @@ static void pti_build_nodes_of(pti_wide_builder *b, uint32_t lanes)
     pti_counter n;
     int k;
     for (k = 0; k < 3; k++) widest = all.box.v[4 + k] + all.box.v[k] > widest ? all.box.v[4 + k] + all.box.v[k] : widest;
-    b->scale = 1 / widest;
+    b->wall = PTI_WALL * widest * widest;
     b->piece_size = lanes / 64 > 4096 ? lanes / 64 : 4096;
     b->next = 1;
     b->nodes[0].first = 0;
@@ -5159,33 +5168,42 @@ static void pti_build_nodes_of(pti_wide_builder *b, uint32_t lanes)
         if (b->nodes[n].child) pti_collapse(b, &b->nodes[n]);
 }
 
-/* An arena, at a multiple of 64 bytes; a large one of 2 MiB, the size of a page of which few are enough. */
-static int pti_alloc_arena(pt_wide *wide, size_t bytes, void *user)
+/* Memory from a multiple of 64 bytes on; if it is much, of 2 MiB, the size of a page of which few are enough. *memory is what
+   is to be freed. */
+static void *pti_alloc_lines(size_t bytes, void **memory, void *user)
 {
     const size_t page = (size_t)1 << 21, step = bytes < 2 * page ? 64 : page;
-    wide->memory = bytes > SIZE_MAX - step ? NULL : pti_alloc(bytes + step, 1, user);
-    if (!wide->memory) return 0;
-    wide->arena = (unsigned char *)(((uintptr_t)wide->memory + step - 1) / step * step);
-    wide->bytes = bytes;
+    unsigned char *lines;
+    *memory = bytes > SIZE_MAX - step ? NULL : pti_alloc(bytes + step, 1, user);
+    if (!*memory) return NULL;
+    lines = (unsigned char *)(((uintptr_t)*memory + step - 1) / step * step);
 #ifdef MADV_HUGEPAGE
-    if (step == page) madvise(wide->arena, bytes / page * page, MADV_HUGEPAGE);
+    if (step == page) madvise(lines, bytes / page * page, MADV_HUGEPAGE);
 #endif
-    return 1;
+    return lines;
+}
+
+static int pti_alloc_arena(pt_wide *wide, size_t bytes, void *user)
+{
+    wide->arena = (unsigned char *)pti_alloc_lines(bytes, &wide->memory, user);
+    wide->bytes = wide->arena ? bytes : 0;
+    return wide->arena != NULL;
 }
 
 /* Over primitives of which `triangles` are triangles, then halves / 2 parallelograms, the rest spheres. 0 = no memory. */
 static int pti_build_wide_tree(const pt_scene *scene, pt_wide *wide, uint32_t triangles, uint32_t halves)
 {
     const uint32_t lanes = scene->primitive_count + halves / 2, nodes = lanes / 2 + 514;
-    void *user = scene->alloc_user, *memory = pti_alloc((size_t)lanes + 2 * (size_t)nodes + 2, sizeof(pti_lanes), user);
+    void *user = scene->alloc_user, *memory;
     pti_wide_builder b;
-    int ok = memory != NULL;
+    int ok;
     memset(&b, 0, sizeof b);
+    b.nodes = (pti_binary *)pti_alloc_lines(((size_t)lanes + 2 * (size_t)nodes) * sizeof(pti_lanes), &memory, user);
+    ok = b.nodes != NULL;
     if (ok) {
         b.scene = scene;
         b.triangles = wide->triangles = triangles;
         b.flats = triangles + halves;
-        b.nodes = (pti_binary *)(((uintptr_t)memory + 63) / 64 * 64);
         b.boxes = (pti_lanes *)(void *)(b.nodes + nodes);
         pti_build_nodes_of(&b, lanes);
         pti_write_tree(&b, 0);
@@ -5200,15 +5218,15 @@ static int pti_build_wide_tree(const pt_scene *scene, pt_wide *wide, uint32_t tr
     return ok;
 }
 
-/* A RAY for lanes, with what bounds their errors. */
+/* A RAY for lanes, with what bounds their errors. Four numbers of what has three: compilers make one operation of them. */
 typedef struct pti_ray8 {
-    float o[3], d[3];
+    float o[4], d[4];
     float span;             /* S                                                                           */
     float reach;            /* m: all |d| together                                                         */
     double unit;            /* t unit is the t of d above                                                  */
     /* for a tree: boxes, t = face * inverse + near (or far), and offsets of the rows of faces */
-    float inverse[3], near[3], far[3];
-    unsigned near_row[3], far_row[3];
+    float inverse[4], near[4], far[4];
+    uint32_t near_row[4], far_row[4];
     /* triangles: offsets of the rows of the axes x y z of [PT-06], shear, and errors: D and K below, and that of z */
     unsigned x, y, z;
     float sx, sy, across, edge, along;
@@ -5223,6 +5241,7 @@ PTI_INLINE int pti_ray8_make(pti_ray8 *w, const pti_ray *r, float extent)
         w->o[k] = (float)r->o[k];
         w->d[k] = (float)r->d[k];
     }
+    w->o[3] = w->d[3] = 0;
     w->unit = 1;
     w->reach = fabsf(w->d[0]) + fabsf(w->d[1]) + fabsf(w->d[2]);
     w->span = fabsf(w->o[0]) + fabsf(w->o[1]) + fabsf(w->o[2]) + extent + PTI_LEAST_SPAN;
@@ -5235,27 +5254,30 @@ PTI_INLINE int pti_ray8_make(pti_ray8 *w, const pti_ray *r, float extent)
     return w->span < PTI_MOST_SPAN && r->end == r->end;
 }
 
-/* One axis of boxes [Ize13]: with q = 1/d as rounded, face * q - o * q is off by at most 5 u (|t| + |o q|), and |t| up to the
+/* Boxes [Ize13]: with q = 1/d as rounded, face * q - o * q is off by at most 5 u (|t| + |o q|), and |t| up to the
    end of the scene is at most S |q|: with the error of o, 7 u S |q|. A direction so flat that q might overflow is taken as
    f = 2^-26 m, m the 1-norm of d: until the end of the scene, at t <= 3 S / m, the ray moves by at most f t either way, so that
    faces are put off by at most 2 t <= 2 u S |q|. */
-PTI_INLINE void pti_ray8_axis(pti_ray8 *w, unsigned k)
+PTI_INLINE void pti_ray8_for_boxes(pti_ray8 *w)
 {
-    const float flat = w->reach * 1.49011612e-8f;
-    const float q = 1 / (fabsf(w->d[k]) < flat ? flat : w->d[k]), from = -w->o[k] * q, off = 12 * PTI_U * w->span * fabsf(q);
-    w->inverse[k] = q;
-    w->near[k] = from - off;
-    w->far[k] = from + off;
-    w->near_row[k] = 32 * (q < 0 ? k + 3 : k);
-    w->far_row[k] = 32 * (q < 0 ? k : k + 3);
+    const float flat = w->reach * 1.49011612e-8f, error = 12 * PTI_U * w->span;
+    uint32_t k;
+    for (k = 0; k < 4; k++) {
+        const float q = 1 / (fabsf(w->d[k]) < flat ? flat : w->d[k]), from = -w->o[k] * q, off = error * fabsf(q);
+        w->inverse[k] = q;
+        w->near[k] = from - off;
+        w->far[k] = from + off;
+    }
+    for (k = 0; k < 4; k++) {
+        w->near_row[k] = 32 * k + (w->inverse[k] < 0 ? 96u : 0u);
+        w->far_row[k] = 64 * k + 96 - w->near_row[k];
+    }
 }
 
 PTI_INLINE void pti_ray8_for_tree(pti_ray8 *w, const pti_ray *r)
 {
     float skew;
-    pti_ray8_axis(w, 0);
-    pti_ray8_axis(w, 1);
-    pti_ray8_axis(w, 2);
+    pti_ray8_for_boxes(w);
     w->x = 32 * (unsigned)r->kx;
     w->y = 32 * (unsigned)r->ky;
     w->z = 32 * (unsigned)r->kz;
@@ -5316,7 +5338,7 @@ typedef struct pti_edges8 {
    product, each rounded once, and by (1 + s) u |o| for the rounding of the origin: by D = (3 + 7 s) u S in all, as |z| <= S and
    |x| <= (1 + s) S. With M = X + D, X the largest |x| and |y|, factors of edge functions are at most M, so these are off by
    4 M (D + u M) <= E = K (X + D), K = (16 + 32 s) u S. */
-PTI_INLINE8 pti_edges8 pti_edge_lanes(const pti_triangle8 *p, const pti_ray *r, const pti_ray8 *w)
+PTI_INLINE8 void pti_edge_lanes(const pti_triangle8 *p, const pti_ray *r, const pti_ray8 *w, pti_edges8 *e)
 {
     const pti_f8 ox = pti_f8_set(w->o[r->kx]), oy = pti_f8_set(w->o[r->ky]), oz = pti_f8_set(w->o[r->kz]);
     const pti_f8 sx = pti_f8_set(w->sx), sy = pti_f8_set(w->sy);
@@ -5328,17 +5350,16 @@ PTI_INLINE8 pti_edges8 pti_edge_lanes(const pti_triangle8 *p, const pti_ray *r, 
     const pti_f8 by = pti_f8_nmadd(sy, bz, pti_f8_sub(pti_row(p->v[3], w->y), oy));
     const pti_f8 cy = pti_f8_nmadd(sy, cz, pti_f8_sub(pti_row(p->v[6], w->y), oy));
     const pti_f8 wide = pti_f8_max(pti_largest8(ax, bx, cx), pti_largest8(ay, by, cy));
-    pti_edges8 e;
-    e.az = az;
-    e.bz = bz;
-    e.cz = cz;
-    e.u = pti_edge8(cx, by, cy, bx);
-    e.v = pti_edge8(ax, cy, ay, cx);
-    e.w = pti_edge8(bx, ay, by, ax);
-    e.low = pti_f8_min(e.u, pti_f8_min(e.v, e.w));
-    e.high = pti_f8_max(e.u, pti_f8_max(e.v, e.w));
-    e.error = pti_f8_madd(wide, pti_f8_set(w->edge), pti_f8_set(w->edge * w->across));
-    return e;
+    const pti_f8 eu = pti_edge8(cx, by, cy, bx), ev = pti_edge8(ax, cy, ay, cx), ew = pti_edge8(bx, ay, by, ax);
+    e->az = az;
+    e->bz = bz;
+    e->cz = cz;
+    e->u = eu;
+    e->v = ev;
+    e->w = ew;
+    e->low = pti_f8_min(eu, pti_f8_min(ev, ew));
+    e->high = pti_f8_max(eu, pti_f8_max(ev, ew));
+    e->error = pti_f8_madd(wide, pti_f8_set(w->edge), pti_f8_set(w->edge * w->across));
 }
 
 /* Depth times determinant: t |d.z| |det| and, in *off, what it is off by; *det: |det|. With N = U a.z + V b.z + W c.z and the
@@ -5359,9 +5380,11 @@ PTI_INLINE8 pti_f8 pti_depth_lanes(const pti_edges8 *e, const pti_ray *r, const 
    pti_depth_error allows for. */
 PTI_INLINE unsigned pti_triangle_lanes(const pti_triangle8 *p, const pti_ray *r, const pti_ray8 *w, float limit, unsigned *sure)
 {
-    const pti_edges8 e = pti_edge_lanes(p, r, w);
-    const pti_f8 zero = pti_f8_set(0), one_side = pti_f8_max(pti_f8_add(e.low, e.error), pti_f8_sub(e.error, e.high));
-    unsigned lanes = pti_m8_bits(pti_f8_le(zero, one_side));
+    const pti_f8 zero = pti_f8_set(0);
+    pti_edges8 e;
+    unsigned lanes;
+    pti_edge_lanes(p, r, w, &e);
+    lanes = pti_m8_bits(pti_f8_le(zero, pti_f8_max(pti_f8_add(e.low, e.error), pti_f8_sub(e.error, e.high))));
     if (lanes) {
         const float flat = fabsf(w->d[r->kz]), end = limit * flat < 2 * w->span ? limit * flat : 2 * w->span;
         pti_f8 det, off;
@@ -5448,11 +5471,20 @@ PTI_INLINE pti_d3 pti_shear_lane(const pti_ray *r, const float *v)
     return pti_shear_axes(r, v[8 * r->kx], v[8 * r->ky], v[8 * r->kz]);
 }
 
+/* pti_edge where the products differ. */
+PTI_INLINE double pti_sure_edge(double a, double b, double c, double d)
+{
+    double p = a * b, q = c * d;
+    PTI_FENCE(p);
+    PTI_FENCE(q);
+    return p - q;
+}
+
 /* Keeps what is hit for certain, if it is nearer than the best: the numbers of pti_sheared_triangle without its questions.
    half: 1 or 2 for the halves of a parallelogram, with its u and v; 0 for a triangle. */
 PTI_INLINE int pti_keep_sure(pti_d3 a, pti_d3 b, pti_d3 c, int half, int id, pti_best *best)
 {
-    const double u = pti_edge(c.x, b.y, c.y, b.x), v = pti_edge(a.x, c.y, a.y, c.x), w = pti_edge(b.x, a.y, b.y, a.x);
+    const double u = pti_sure_edge(c.x, b.y, c.y, b.x), v = pti_sure_edge(a.x, c.y, a.y, c.x), w = pti_sure_edge(b.x, a.y, b.y, a.x);
     const double det = u + v + w;
     double p = u * a.z, q = v * b.z, depth = w * c.z, b1, b2;
     PTI_FENCE(p);
@@ -5685,7 +5717,7 @@ typedef struct pti_planes8 {
 /* n.o + n3 is off by 36 u S (9 of these for the rounded corners of a parallelogram), n.d by 14 u m, so t by X = 96 u S / |n.d|.
    As |n.d| <= m, m X is at least 96 u S: so u, v and w are off by at most 3 G m X. Nothing is said of a lane where n is
    not known or where numbers overflow: NaN is not < 0. */
-PTI_INLINE8 pti_planes8 pti_plane_lanes(const pti_plane8 *p, const pti_ray8 *w)
+PTI_INLINE8 void pti_plane_lanes(const pti_plane8 *p, const pti_ray8 *w, pti_planes8 *h)
 {
     const pti_f8 ox = pti_f8_set(w->o[0]), oy = pti_f8_set(w->o[1]), oz = pti_f8_set(w->o[2]), zero = pti_f8_set(0);
     const pti_f8 dx = pti_f8_set(w->d[0]), dy = pti_f8_set(w->d[1]), dz = pti_f8_set(w->d[2]), one = pti_f8_set(1);
@@ -5694,13 +5726,12 @@ PTI_INLINE8 pti_planes8 pti_plane_lanes(const pti_plane8 *p, const pti_ray8 *w)
     const pti_f8 u = pti_f8_madd(t, pti_dot8(p->u, dx, dy, dz, zero), pti_dot8(p->u, ox, oy, oz, pti_f8_load(p->u[3])));
     const pti_f8 v = pti_f8_madd(t, pti_dot8(p->v, dx, dy, dz, zero), pti_dot8(p->v, ox, oy, oz, pti_f8_load(p->v[3])));
     const pti_f8 less = pti_f8_min(u, v), rest = pti_f8_madd(pti_f8_load(p->both), less, pti_f8_sub(pti_f8_sub(one, u), v));
-    pti_planes8 h;
-    h.t = t;
-    h.off = pti_f8_mul(pti_f8_abs(inverse), pti_f8_set(96 * PTI_U * w->span));
-    h.inside = pti_f8_min(less, rest);
-    h.more = pti_f8_sub(v, u);
-    h.error = pti_f8_mul(h.off, pti_f8_mul(pti_f8_load(p->steep), pti_f8_set(3 * w->reach)));
-    return h;
+    const pti_f8 off = pti_f8_mul(pti_f8_abs(inverse), pti_f8_set(96 * PTI_U * w->span));
+    h->t = t;
+    h->off = off;
+    h->inside = pti_f8_min(less, rest);
+    h->more = pti_f8_sub(v, u);
+    h->error = pti_f8_mul(off, pti_f8_mul(pti_f8_load(p->steep), pti_f8_set(3 * w->reach)));
 }
 
 /* Where they begin, as spheres do. */
@@ -5711,14 +5742,13 @@ PTI_INLINE pti_f8 pti_plane_starts(const pti_planes8 *h)
 }
 
 /* Which may be hit by the limit? *margin > 0: is hit for certain. A hit is at t <= 3 S / m, and 2 G S >= 1, for no edge is
-   longer than 2 S along an axis: so what t must be clear of, 2 S / m times the error of weights, is at least 288 u S / m and
-   3 X, which is more than the limit was rounded by. */
-PTI_INLINE unsigned pti_planes_within(const pti_planes8 *h, const pti_ray8 *w, float limit, pti_f8 *margin)
+   longer than 2 S along an axis: so what t must be clear of, with clear = 2 S / m times the error of weights, is at least
+   288 u S / m and 3 X, which is more than the limit was rounded by. */
+PTI_INLINE unsigned pti_planes_within(const pti_planes8 *h, float limit, float clear, pti_f8 *margin)
 {
     const pti_f8 within = pti_f8_min(h->t, pti_f8_sub(pti_f8_set(limit), h->t));
     const pti_f8 seen = pti_f8_min(pti_f8_add(h->inside, h->error), pti_f8_add(within, h->off));
-    const pti_f8 clear = pti_f8_nmadd(h->error, pti_f8_set(2 * w->span / w->reach), within);
-    *margin = pti_f8_min(clear, pti_f8_nmadd(h->error, pti_f8_set(2), h->inside));
+    *margin = pti_f8_min(pti_f8_nmadd(h->error, pti_f8_set(clear), within), pti_f8_nmadd(h->error, pti_f8_set(2), h->inside));
     return 255 ^ pti_m8_bits(pti_f8_lt(seen, pti_f8_set(0)));
 }
 
@@ -5794,11 +5824,12 @@ PTI_INLINE int pti_nearest_small(const pt_scene *scene, const pti_ray *r, const 
     const int planes = scene->wide.plane_blocks, spheres = scene->wide.sphere_blocks;
     const float end = pti_ray8_limit(w, best->t);
     pti_f8 least = pti_f8_set(HUGE_VALF);
+    pti_planes8 h;
     pti_starts s;
     float start, limit = pti_last_start(end);
     int found = 0, i;
     for (i = 0; i < planes; i++) {
-        const pti_planes8 h = pti_plane_lanes(&small->planes[i], w);
+        pti_plane_lanes(&small->planes[i], w, &h);
         s.t[i].f = pti_f8_tag(pti_plane_starts(&h), small->tag + 8 * i);
         s.inside[i].f = h.inside;
         s.more[i].f = h.more;
@@ -5823,13 +5854,14 @@ PTI_INLINE int pti_any_small(const pt_scene *scene, const pti_ray *r, const pti_
 {
     const pti_small *small = (const pti_small *)(const void *)scene->wide.arena;
     const int planes = scene->wide.plane_blocks, spheres = scene->wide.sphere_blocks;
-    const float end = pti_ray8_limit(w, best->t);
+    const float end = pti_ray8_limit(w, best->t), clear = 2 * w->span / w->reach;
     pti_f8 sure = pti_f8_set(0), margin;
+    pti_planes8 h;
     uint64_t may = 0;
     int i;
     for (i = 0; i < planes; i++) {
-        const pti_planes8 h = pti_plane_lanes(&small->planes[i], w);
-        may |= (uint64_t)pti_planes_within(&h, w, end, &margin) << 8 * i;
+        pti_plane_lanes(&small->planes[i], w, &h);
+        may |= (uint64_t)pti_planes_within(&h, end, clear, &margin) << 8 * i;
         sure = pti_f8_max(margin, sure);
     }
     if (pti_m8_bits(pti_f8_lt(pti_f8_set(0), sure))) return 1;

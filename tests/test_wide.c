@@ -464,11 +464,12 @@ static void bounds_of_block(const pti_triangle8 *p, const pti_ray *r, const pti_
 {
     const double end = r->end < 3e38 ? r->end : 3e38;
     const float limit = pti_ray8_limit(w, end);
-    const pti_edges8 e = pti_edge_lanes(p, r, w);
+    pti_edges8 e;
     pti_lanes u, v, x, error, t, det, off;
     unsigned sure = 0, may;
     pti_f8 bound, all;
     int i;
+    pti_edge_lanes(p, r, w, &e);
     u.f = e.u;
     v.f = e.v;
     x.f = e.w;
@@ -555,9 +556,9 @@ static void bounds_of_planes(void)
             double end;
             if (!pti_ray8_make(&w, &r, s.wide.extent)) continue;
             end = r.end < 3e38 ? r.end : 3e38;
-            h = pti_plane_lanes(&small->planes[block], &w);
+            pti_plane_lanes(&small->planes[block], &w, &h);
             start.f = pti_plane_starts(&h);
-            may = pti_planes_within(&h, &w, pti_ray8_limit(&w, end), &sure);
+            may = pti_planes_within(&h, pti_ray8_limit(&w, end), 2 * w.span / w.reach, &sure);
             more.f = h.more;
             error.f = h.error;
             margin.f = sure;
