@@ -4767,10 +4767,10 @@ static int pti_traverse(const pt_scene *scene, const pti_ray *r, pti_best *best,
    four times as fast (make bench-embree compares it with Embree). Eight boxes or triangles are tested at a time, one in each lane ([PT-01]).
 
    Lanes are float, and float cannot decide: [PT-06] decides in double, exactly. So a lane only asks whether a primitive
-   MAY be hit. It computes in float what [PT-06] computes in double, and a bound of the difference, and says no where
-   the bound allows no other answer. What is left, little more than one primitive for each hit, goes to [PT-06]. So
-   rounding costs time, never a hit: the wide tree, the binary tree and the linear search agree, and a lane may use
-   fused multiply-adds where there are some.
+   MAY be hit. It computes in float what [PT-06] computes in double, and a bound of the difference, and says no, or yes, where
+   the bound allows no other answer. What it does not deny, little more than one primitive for each hit, goes to [PT-06], or,
+   where it is certain, only through its arithmetic. So rounding costs time, never a hit: the wide tree, the binary tree and
+   the linear search agree, and a lane may use fused multiply-adds where there are some.
 
    Below, u = 2^-24 is the roundoff of float: each operation is off by u of its result. S is a length that no coordinate of
    a ray's origin and of the scene exceeds, and no way between them along an axis. It is kept between 2^-16 and 2^40: then no
@@ -5593,7 +5593,7 @@ typedef struct pti_tested {
 typedef struct pti_small {
     pti_plane8 planes[PTI_SMALL / 8];
     pti_sphere8 spheres[PTI_SMALL / 8];
-    uint32_t tag[PTI_SMALL]; /* 0, 1, 2, ...                                                                */
+    pti_lanes tag[PTI_SMALL / 8]; /* bits 0, 1, 2, ...                                                      */
     pti_tested tested[2 * PTI_SMALL];
 } pti_small;
 
@@ -5675,7 +5675,7 @@ static int pti_build_small(const pt_scene *scene, pt_wide *wide, uint32_t flats)
     uint32_t i, lane = 0;
     if (!pti_alloc_arena(wide, sizeof *out, scene->alloc_user)) return 0;
     out = (pti_small *)(void *)wide->arena;
-    for (i = 0; i < PTI_SMALL; i++) out->tag[i] = i;
+    for (i = 0; i < PTI_SMALL; i++) out->tag[i / 8].bits[i % 8] = i;
     for (i = 0; i < flats || lane % 8 > 0; lane++) i += pti_write_flat(scene, out, lane, i, flats);
     wide->plane_blocks = (int)(lane / 8);
     for (i = 0; flats + i < count || i % 8 > 0; i++, lane++) {
@@ -5752,25 +5752,18 @@ PTI_INLINE unsigned pti_planes_within(const pti_planes8 *h, float limit, float c
     return 255 ^ pti_m8_bits(pti_f8_lt(seen, pti_f8_set(0)));
 }
 
-/* x >= 0 with its lowest seven bits replaced by a tag. */
-PTI_INLINE pti_f8 pti_f8_tag(pti_f8 x, const uint32_t *tag)
+/* x >= 0 with its lowest seven bits replaced by those of a tag. */
+PTI_INLINE float pti_tagged(float x, float tag)
 {
-#if PTI_LANES == 2
-    const __m256 high = _mm256_castsi256_ps(_mm256_set1_epi32(~127));
-    return _mm256_or_ps(_mm256_and_ps(x, high), pti_f8_load((const float *)(const void *)tag));
-#elif PTI_LANES == 1
-    const __m128 high = _mm_castsi128_ps(_mm_set1_epi32(~127));
-    const pti_f8 t = pti_f8_load((const float *)(const void *)tag);
-    return pti_f8_pair(_mm_or_ps(_mm_and_ps(x.a, high), t.a), _mm_or_ps(_mm_and_ps(x.b, high), t.b));
-#else
-    uint32_t bits[8];
-    int i;
-    memcpy(bits, x.v, sizeof bits);
-    for (i = 0; i < 8; i++) bits[i] = (bits[i] & ~(uint32_t)127) | tag[i];
-    memcpy(x.v, bits, sizeof bits);
+    uint32_t a, b;
+    memcpy(&a, &x, sizeof a);
+    memcpy(&b, &tag, sizeof b);
+    a = (a & ~(uint32_t)127) | b;
+    memcpy(&x, &a, sizeof x);
     return x;
-#endif
 }
+PTI_F8(pti_f8, pti_f8_tag, _mm256_or_ps(_mm256_and_ps(x, _mm256_castsi256_ps(_mm256_set1_epi32(~127))), y),
+       _mm_or_ps(_mm_and_ps(x, _mm_castsi128_ps(_mm_set1_epi32(~127))), y), pti_tagged(x, y))
 
 /* The latest start of what is hit by a limit: 127 units of the last place are at most 2^-16 of it. */
 PTI_INLINE float pti_last_start(float limit) { return limit + limit * (256 * PTI_U); }
@@ -5818,30 +5811,30 @@ PTI_INLINE int pti_test_start(const pt_scene *scene, const pti_ray *r, const pti
     return pti_test_both(scene, r, e, best);
 }
 
+/* The nearest, in the order of starts. */
 PTI_INLINE int pti_nearest_small(const pt_scene *scene, const pti_ray *r, const pti_ray8 *w, pti_best *best)
 {
     const pti_small *small = (const pti_small *)(const void *)scene->wide.arena;
-    const int planes = scene->wide.plane_blocks, spheres = scene->wide.sphere_blocks;
     const float end = pti_ray8_limit(w, best->t);
+    float start, limit = pti_last_start(end);
     pti_f8 least = pti_f8_set(HUGE_VALF);
     pti_planes8 h;
     pti_starts s;
-    float start, limit = pti_last_start(end);
     int found = 0, i;
-    for (i = 0; i < planes; i++) {
+    s.planes = scene->wide.plane_blocks;
+    s.count = s.planes + scene->wide.sphere_blocks;
+    for (i = 0; i < s.planes; i++) {
         pti_plane_lanes(&small->planes[i], w, &h);
-        s.t[i].f = pti_f8_tag(pti_plane_starts(&h), small->tag + 8 * i);
+        s.t[i].f = pti_f8_tag(pti_plane_starts(&h), small->tag[i].f);
         s.inside[i].f = h.inside;
         s.more[i].f = h.more;
         s.error[i].f = h.error;
         least = pti_f8_min(least, s.t[i].f);
     }
-    for (i = 0; i < spheres; i++) {
-        s.t[planes + i].f = pti_f8_tag(pti_sphere_lanes(&small->spheres[i], w), small->tag + 8 * (planes + i));
-        least = pti_f8_min(least, s.t[planes + i].f);
+    for (; i < s.count; i++) {
+        s.t[i].f = pti_f8_tag(pti_sphere_lanes(&small->spheres[i - s.planes], w), small->tag[i].f);
+        least = pti_f8_min(least, s.t[i].f);
     }
-    s.planes = planes;
-    s.count = planes + spheres;
     for (start = pti_f8_least(least); start <= limit; start = pti_next_start(&s, start, limit)) {
         if (!pti_test_start(scene, r, w, &s, start, end, best)) continue;
         found = 1;
@@ -5850,10 +5843,11 @@ PTI_INLINE int pti_nearest_small(const pt_scene *scene, const pti_ray *r, const 
     return found;
 }
 
+/* Any, in no order. */
 PTI_INLINE int pti_any_small(const pt_scene *scene, const pti_ray *r, const pti_ray8 *w, pti_best *best)
 {
     const pti_small *small = (const pti_small *)(const void *)scene->wide.arena;
-    const int planes = scene->wide.plane_blocks, spheres = scene->wide.sphere_blocks;
+    const int planes = scene->wide.plane_blocks, count = planes + scene->wide.sphere_blocks;
     const float end = pti_ray8_limit(w, best->t), clear = 2 * w->span / w->reach;
     pti_f8 sure = pti_f8_set(0), margin;
     pti_planes8 h;
@@ -5865,12 +5859,9 @@ PTI_INLINE int pti_any_small(const pt_scene *scene, const pti_ray *r, const pti_
         sure = pti_f8_max(margin, sure);
     }
     if (pti_m8_bits(pti_f8_lt(pti_f8_set(0), sure))) return 1;
-    for (i = 0; i < spheres; i++)
-        may |= (uint64_t)pti_m8_bits(pti_f8_le(pti_sphere_lanes(&small->spheres[i], w), pti_f8_set(end))) << 8 * (planes + i);
-    for (; may; may &= may - 1) {
-        const int lane = (uint32_t)may ? pti_lowest_bit((uint32_t)may) : 32 + pti_lowest_bit((uint32_t)(may >> 32));
-        if (pti_test_both(scene, r, &small->tested[lane], best)) return 1;
-    }
+    for (; i < count; i++) may |= (uint64_t)pti_m8_bits(pti_f8_le(pti_sphere_lanes(&small->spheres[i - planes], w), pti_f8_set(end))) << 8 * i;
+    for (i = 0; i < PTI_SMALL && may >> i; i++)
+        if ((may >> i & 1) && pti_test_both(scene, r, &small->tested[i], best)) return 1;
     return 0;
 }
 

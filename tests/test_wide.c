@@ -124,7 +124,7 @@ static void lanes_together(void)
         {
             pti_lanes aligned;
             memcpy(aligned.bits, tag, sizeof tag);
-            tagged.f = pti_f8_tag(x.f, aligned.bits);
+            tagged.f = pti_f8_tag(x.f, aligned.f);
         }
         for (k = 0; k < 8; k++) {
             const double bound = 2e-7 * (fabs((double)x.v[k] * (double)y.v[k]) + fabs((double)z.v[k]));
