@@ -4825,7 +4825,7 @@ typedef struct pti_sphere8 {
 #define PTI_PIECES 256
 #define PTI_WIDE_DEPTH 32   /* deeper down lists are halved, and end within 28 levels                      */
 #define PTI_WALL 0.1f       /* a leaf of more than a 30th of the surface of a cube around the scene is cut where that pays */
-#define PTI_FEW 64          /* for lists that are shorter, half of the bins do                             */
+#define PTI_FEW 33          /* for lists that are shorter, half of the bins do                             */
 
 /* Some boxes joined, and {-least, greatest} of twice their centres. */
 typedef struct pti_joined {
@@ -5218,15 +5218,15 @@ static int pti_build_wide_tree(const pt_scene *scene, pt_wide *wide, uint32_t tr
     return ok;
 }
 
-/* A RAY for lanes, with what bounds their errors. Four numbers of what has three: compilers make one operation of them. */
+/* A RAY for lanes, with what bounds their errors. */
 typedef struct pti_ray8 {
-    float o[4], d[4];
+    float o[3], d[3];
     float span;             /* S                                                                           */
     float reach;            /* m: all |d| together                                                         */
     double unit;            /* t unit is the t of d above                                                  */
     /* for a tree: boxes, t = face * inverse + near (or far), and offsets of the rows of faces */
-    float inverse[4], near[4], far[4];
-    uint32_t near_row[4], far_row[4];
+    float inverse[3], near[3], far[3];
+    unsigned near_row[3], far_row[3];
     /* triangles: offsets of the rows of the axes x y z of [PT-06], shear, and errors: D and K below, and that of z */
     unsigned x, y, z;
     float sx, sy, across, edge, along;
@@ -5241,7 +5241,6 @@ PTI_INLINE int pti_ray8_make(pti_ray8 *w, const pti_ray *r, float extent)
         w->o[k] = (float)r->o[k];
         w->d[k] = (float)r->d[k];
     }
-    w->o[3] = w->d[3] = 0;
     w->unit = 1;
     w->reach = fabsf(w->d[0]) + fabsf(w->d[1]) + fabsf(w->d[2]);
     w->span = fabsf(w->o[0]) + fabsf(w->o[1]) + fabsf(w->o[2]) + extent + PTI_LEAST_SPAN;
@@ -5254,30 +5253,27 @@ PTI_INLINE int pti_ray8_make(pti_ray8 *w, const pti_ray *r, float extent)
     return w->span < PTI_MOST_SPAN && r->end == r->end;
 }
 
-/* Boxes [Ize13]: with q = 1/d as rounded, face * q - o * q is off by at most 5 u (|t| + |o q|), and |t| up to the
+/* One axis of boxes [Ize13]: with q = 1/d as rounded, face * q - o * q is off by at most 5 u (|t| + |o q|), and |t| up to the
    end of the scene is at most S |q|: with the error of o, 7 u S |q|. A direction so flat that q might overflow is taken as
    f = 2^-26 m, m the 1-norm of d: until the end of the scene, at t <= 3 S / m, the ray moves by at most f t either way, so that
    faces are put off by at most 2 t <= 2 u S |q|. */
-PTI_INLINE void pti_ray8_for_boxes(pti_ray8 *w)
+PTI_INLINE void pti_ray8_axis(pti_ray8 *w, unsigned k)
 {
-    const float flat = w->reach * 1.49011612e-8f, error = 12 * PTI_U * w->span;
-    uint32_t k;
-    for (k = 0; k < 4; k++) {
-        const float q = 1 / (fabsf(w->d[k]) < flat ? flat : w->d[k]), from = -w->o[k] * q, off = error * fabsf(q);
-        w->inverse[k] = q;
-        w->near[k] = from - off;
-        w->far[k] = from + off;
-    }
-    for (k = 0; k < 4; k++) {
-        w->near_row[k] = 32 * k + (w->inverse[k] < 0 ? 96u : 0u);
-        w->far_row[k] = 64 * k + 96 - w->near_row[k];
-    }
+    const float flat = w->reach * 1.49011612e-8f;
+    const float q = 1 / (fabsf(w->d[k]) < flat ? flat : w->d[k]), from = -w->o[k] * q, off = 12 * PTI_U * w->span * fabsf(q);
+    w->inverse[k] = q;
+    w->near[k] = from - off;
+    w->far[k] = from + off;
+    w->near_row[k] = 32 * (q < 0 ? k + 3 : k);
+    w->far_row[k] = 32 * (q < 0 ? k : k + 3);
 }
 
 PTI_INLINE void pti_ray8_for_tree(pti_ray8 *w, const pti_ray *r)
 {
     float skew;
-    pti_ray8_for_boxes(w);
+    pti_ray8_axis(w, 0);
+    pti_ray8_axis(w, 1);
+    pti_ray8_axis(w, 2);
     w->x = 32 * (unsigned)r->kx;
     w->y = 32 * (unsigned)r->ky;
     w->z = 32 * (unsigned)r->kz;
@@ -5593,7 +5589,7 @@ typedef struct pti_tested {
 typedef struct pti_small {
     pti_plane8 planes[PTI_SMALL / 8];
     pti_sphere8 spheres[PTI_SMALL / 8];
-    pti_lanes tag[PTI_SMALL / 8]; /* bits 0, 1, 2, ...                                                      */
+    pti_lanes tag[PTI_SMALL / 4]; /* bits 0, 1, 2, ...: numbers of what is tested                           */
     pti_tested tested[2 * PTI_SMALL];
 } pti_small;
 
@@ -5675,7 +5671,7 @@ static int pti_build_small(const pt_scene *scene, pt_wide *wide, uint32_t flats)
     uint32_t i, lane = 0;
     if (!pti_alloc_arena(wide, sizeof *out, scene->alloc_user)) return 0;
     out = (pti_small *)(void *)wide->arena;
-    for (i = 0; i < PTI_SMALL; i++) out->tag[i / 8].bits[i % 8] = i;
+    for (i = 0; i < 2 * PTI_SMALL; i++) out->tag[i / 8].bits[i % 8] = i;
     for (i = 0; i < flats || lane % 8 > 0; lane++) i += pti_write_flat(scene, out, lane, i, flats);
     wide->plane_blocks = (int)(lane / 8);
     for (i = 0; flats + i < count || i % 8 > 0; i++, lane++) {
@@ -5768,10 +5764,11 @@ PTI_F8(pti_f8, pti_f8_tag, _mm256_or_ps(_mm256_and_ps(x, _mm256_castsi256_ps(_mm
 /* The latest start of what is hit by a limit: 127 units of the last place are at most 2^-16 of it. */
 PTI_INLINE float pti_last_start(float limit) { return limit + limit * (256 * PTI_U); }
 
-/* Where the lanes begin, block by block, and what planes say. The lowest seven bits of a start are its lane: so no two are
-   equal, and the least of them says who it is. */
+/* Where the lanes begin, block by block, and what planes say. The lowest seven bits of a start are the number of what is to be
+   tested: so no two are equal, and the least of them says who it is. */
 typedef struct pti_starts {
     pti_lanes t[PTI_SMALL / 8], inside[PTI_SMALL / 8], more[PTI_SMALL / 8], error[PTI_SMALL / 8];
+    float clear, end;       /* S / m; where no hit is known                                                */
     int planes, count;
 } pti_starts;
 
@@ -5792,40 +5789,46 @@ static int pti_test_both(const pt_scene *scene, const pti_ray *r, const pti_test
     return e[PTI_SMALL].id == e->id ? hit : hit | pti_test(scene, r, e[PTI_SMALL].id, best);
 }
 
-/* Tests the lane that a start tells of: only the half that is hit, where that is certain, as pti_planes_within has it; t is
-   less than 1.4 times the start then, and end, from where no hit was known, not near. */
-PTI_INLINE int pti_test_start(const pt_scene *scene, const pti_ray *r, const pti_ray8 *w, const pti_starts *s, float start, float end, pti_best *best)
+/* Tests what a start tells of if that is certain, as pti_planes_within has it, else all of its lane. t is less than two starts
+   then, and less than start + 2 X: so *limit, of starts, does not have to wait for numbers in double. */
+PTI_INLINE int pti_test_start(const pt_scene *scene, const pti_ray *r, const pti_ray8 *w, const pti_starts *s, float start, float *limit, pti_best *best)
 {
     const pti_tested *e = ((const pti_small *)(const void *)scene->wide.arena)->tested;
-    uint32_t lane;
-    memcpy(&lane, &start, sizeof lane);
-    lane %= PTI_SMALL;
-    e += lane;
+    uint32_t at, lane;
+    memcpy(&at, &start, sizeof at);
+    at %= 2 * PTI_SMALL;
+    lane = at % PTI_SMALL;
     if ((int)lane / 8 < s->planes) {
-        const float more = s->more[lane / 8].v[lane % 8], error = 2 * s->error[lane / 8].v[lane % 8];
-        if (s->inside[lane / 8].v[lane % 8] > error && fabsf(more) > error && start * w->reach > error * w->span && 2 * start < end) {
-            if (more > 0) e += PTI_SMALL;
+        const float error = 2 * s->error[lane / 8].v[lane % 8], clear = error * s->clear, last = pti_last_start(start + clear);
+        if (s->inside[lane / 8].v[lane % 8] > error && fabsf(s->more[lane / 8].v[lane % 8]) > error && start > clear && 2 * start < s->end) {
+            *limit = last < *limit ? last : *limit;
+            e += at;
             return pti_keep_sure(pti_shear(r, &e->corner[0]), pti_shear(r, &e->corner[1]), pti_shear(r, &e->corner[2]), e->half, e->id, best);
         }
     }
-    return pti_test_both(scene, r, e, best);
+    if (!pti_test_both(scene, r, e + lane, best)) return 0;
+    *limit = pti_last_start(pti_ray8_limit(w, best->t));
+    return 1;
 }
 
 /* The nearest, in the order of starts. */
 PTI_INLINE int pti_nearest_small(const pt_scene *scene, const pti_ray *r, const pti_ray8 *w, pti_best *best)
 {
     const pti_small *small = (const pti_small *)(const void *)scene->wide.arena;
-    const float end = pti_ray8_limit(w, best->t);
-    float start, limit = pti_last_start(end);
+    const pti_f8 zero = pti_f8_set(0);
     pti_f8 least = pti_f8_set(HUGE_VALF);
     pti_planes8 h;
     pti_starts s;
+    float start, limit;
     int found = 0, i;
+    s.clear = w->span / w->reach;
+    s.end = pti_ray8_limit(w, best->t);
+    limit = pti_last_start(s.end);
     s.planes = scene->wide.plane_blocks;
     s.count = s.planes + scene->wide.sphere_blocks;
     for (i = 0; i < s.planes; i++) {
         pti_plane_lanes(&small->planes[i], w, &h);
-        s.t[i].f = pti_f8_tag(pti_plane_starts(&h), small->tag[i].f);
+        s.t[i].f = pti_f8_tag(pti_plane_starts(&h), pti_f8_select(pti_f8_lt(zero, h.more), small->tag[PTI_SMALL / 8 + i].f, small->tag[i].f));
         s.inside[i].f = h.inside;
         s.more[i].f = h.more;
         s.error[i].f = h.error;
@@ -5835,11 +5838,8 @@ PTI_INLINE int pti_nearest_small(const pt_scene *scene, const pti_ray *r, const 
         s.t[i].f = pti_f8_tag(pti_sphere_lanes(&small->spheres[i - s.planes], w), small->tag[i].f);
         least = pti_f8_min(least, s.t[i].f);
     }
-    for (start = pti_f8_least(least); start <= limit; start = pti_next_start(&s, start, limit)) {
-        if (!pti_test_start(scene, r, w, &s, start, end, best)) continue;
-        found = 1;
-        limit = pti_last_start(pti_ray8_limit(w, best->t));
-    }
+    for (start = pti_f8_least(least); start <= limit; start = pti_next_start(&s, start, limit))
+        found |= pti_test_start(scene, r, w, &s, start, &limit, best);
     return found;
 }
 
