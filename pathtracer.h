@@ -5232,8 +5232,15 @@ typedef struct pti_ray8 {
     float sx, sy, across, edge, along;
 } pti_ray8;
 
-/* 0: a ray that is not finite or from beyond 2^40: the linear search takes it. A direction far from length 1 is measured in
-   its longest component, so that o/d does not overflow. */
+/* A direction far from length 1 is measured in its longest component, so that o/d does not overflow. Apart from what follows,
+   so that nothing of it is done for other rays. */
+static pt_vec3 pti_ray8_measure(const pti_ray *r)
+{
+    const double unit = fabs(r->d[r->kz]);
+    return pt_v3((pt_real)(r->d[0] / unit), (pt_real)(r->d[1] / unit), (pt_real)(r->d[2] / unit));
+}
+
+/* 0: a ray that is not finite or from beyond 2^40: the linear search takes it. */
 PTI_INLINE int pti_ray8_make(pti_ray8 *w, const pti_ray *r, float extent)
 {
     int k;
@@ -5245,9 +5252,12 @@ PTI_INLINE int pti_ray8_make(pti_ray8 *w, const pti_ray *r, float extent)
     w->reach = fabsf(w->d[0]) + fabsf(w->d[1]) + fabsf(w->d[2]);
     w->span = fabsf(w->o[0]) + fabsf(w->o[1]) + fabsf(w->o[2]) + extent + PTI_LEAST_SPAN;
     if (!(w->reach > 1e-6f && w->reach < 1e6f)) {
+        const pt_vec3 d = pti_ray8_measure(r);
         w->unit = fabs(r->d[r->kz]);
-        for (k = 0; k < 3; k++) w->d[k] = (float)(r->d[k] / w->unit);
-        w->reach = fabsf(w->d[0]) + fabsf(w->d[1]) + fabsf(w->d[2]);
+        w->d[0] = d.x;
+        w->d[1] = d.y;
+        w->d[2] = d.z;
+        w->reach = fabsf(d.x) + fabsf(d.y) + fabsf(d.z);
         if (!(w->reach < 4)) return 0; /* nor is NaN */
     }
     return w->span < PTI_MOST_SPAN && r->end == r->end;
