@@ -5451,7 +5451,7 @@ PTI_INLINE void pti_fetch(const unsigned char *p)
 
 PTI_INLINE pti_waiting pti_child(const pt_wide *tree, const pti_node8 *n, int i, const pti_lanes *begin)
 {
-    pti_fetch(pti_place(tree, n->child[i]));
+    pti_fetch(tree->arena + ((size_t)n->child[i] << 3));
     return (uint64_t)begin->bits[i] << 32 | n->child[i];
 }
 
@@ -5545,7 +5545,7 @@ PTI_INLINE int pti_traverse_wide(const pt_scene *scene, const pti_ray *r, const 
     memcpy(&limit_bits, &limit, sizeof limit_bits);
     for (;;) {
         if ((at & 7) == PTI_NODE) {
-            const pti_node8 *n = (const pti_node8 *)(const void *)pti_place(tree, at);
+            const pti_node8 *n = (const pti_node8 *)(const void *)(tree->arena + ((size_t)at << 3)); /* PTI_NODE is 0 */
             pti_lanes begin;
             const unsigned lanes = pti_node_lanes(n, w, limit, &begin);
             if (lanes & (lanes - 1)) {
@@ -5554,7 +5554,7 @@ PTI_INLINE int pti_traverse_wide(const pt_scene *scene, const pti_ray *r, const 
             }
             if (lanes) {
                 at = n->child[pti_lowest_bit(lanes)];
-                pti_fetch(pti_place(tree, at));
+                pti_fetch(tree->arena + ((size_t)at << 3));
                 continue;
             }
         } else if (pti_test_leaf(scene, at, r, w, limit, best, any)) {
