@@ -5183,13 +5183,6 @@ static void *pti_alloc_lines(size_t bytes, void **memory, void *user)
     return lines;
 }
 
-static int pti_alloc_arena(pt_wide *wide, size_t bytes, void *user)
-{
-    wide->arena = (unsigned char *)pti_alloc_lines(bytes, &wide->memory, user);
-    wide->bytes = wide->arena ? bytes : 0;
-    return wide->arena != NULL;
-}
-
 /* Over primitives of which `triangles` are triangles, then halves / 2 parallelograms, the rest spheres. 0 = no memory. */
 static int pti_build_wide_tree(const pt_scene *scene, pt_wide *wide, uint32_t triangles, uint32_t halves)
 {
@@ -5207,10 +5200,11 @@ static int pti_build_wide_tree(const pt_scene *scene, pt_wide *wide, uint32_t tr
         b.boxes = (pti_lanes *)(void *)(b.nodes + nodes);
         pti_build_nodes_of(&b, lanes);
         pti_write_tree(&b, 0);
-        ok = b.used / 64 < (size_t)1 << 29 && pti_alloc_arena(wide, b.used, user);
+        if (b.used / 64 < (size_t)1 << 29) b.arena = wide->arena = (unsigned char *)pti_alloc_lines(b.used, &wide->memory, user);
+        ok = b.arena != NULL;
     }
     if (ok) {
-        b.arena = wide->arena;
+        wide->bytes = b.used;
         b.used = 0;
         wide->root = pti_write_tree(&b, 0);
     }
@@ -5677,10 +5671,11 @@ static uint32_t pti_write_flat(const pt_scene *scene, pti_small *out, uint32_t l
 static int pti_build_small(const pt_scene *scene, pt_wide *wide, uint32_t flats)
 {
     const uint32_t count = scene->primitive_count;
-    pti_small *out;
+    pti_small *out = (pti_small *)pti_alloc_lines(sizeof *out, &wide->memory, scene->alloc_user);
     uint32_t i, lane = 0;
-    if (!pti_alloc_arena(wide, sizeof *out, scene->alloc_user)) return 0;
-    out = (pti_small *)(void *)wide->arena;
+    if (!out) return 0;
+    wide->arena = (unsigned char *)out;
+    wide->bytes = sizeof *out;
     for (i = 0; i < 2 * PTI_SMALL; i++) out->tag[i / 8].bits[i % 8] = i;
     for (i = 0; i < flats || lane % 8 > 0; lane++) i += pti_write_flat(scene, out, lane, i, flats);
     wide->plane_blocks = (int)(lane / 8);
@@ -5715,7 +5710,7 @@ PTI_INLINE pti_f8 pti_dot8(const float rows[4][8], pti_f8 x, pti_f8 y, pti_f8 z,
     return pti_f8_madd(pti_f8_load(rows[0]), x, pti_f8_madd(pti_f8_load(rows[1]), y, pti_f8_madd(pti_f8_load(rows[2]), z, w)));
 }
 
-/* What eight planes say: t and how far it may be off; the least weight, v - u, and a bound of the error of u, of v and of w. */
+/* What eight planes say: t and how far it may be off (X); the least weight, v - u, and a bound of the error of u, v and w. */
 typedef struct pti_planes8 {
     pti_f8 t, off, inside, more, error;
 } pti_planes8;
@@ -5799,8 +5794,8 @@ static int pti_test_both(const pt_scene *scene, const pti_ray *r, const pti_test
     return e[PTI_SMALL].id == e->id ? hit : hit | pti_test(scene, r, e[PTI_SMALL].id, best);
 }
 
-/* Tests what a start tells of if that is certain, as pti_planes_within has it, else all of its lane. t is less than two starts
-   then, and less than start + 2 X: so *limit, of starts, does not have to wait for numbers in double. */
+/* Tests what a start tells of if that is certain, as pti_planes_within has it, else all of its lane. As t is at most start + 2 X
+   then, apart from the tag, *limit, of starts, does not have to wait for numbers in double: 2 X < clear < start. */
 PTI_INLINE int pti_test_start(const pt_scene *scene, const pti_ray *r, const pti_ray8 *w, const pti_starts *s, float start, float *limit, pti_best *best)
 {
     const pti_tested *e = ((const pti_small *)(const void *)scene->wide.arena)->tested;
@@ -5809,7 +5804,7 @@ PTI_INLINE int pti_test_start(const pt_scene *scene, const pti_ray *r, const pti
     at %= 2 * PTI_SMALL;
     lane = at % PTI_SMALL;
     if ((int)lane / 8 < s->planes) {
-        const float error = 2 * s->error[lane / 8].v[lane % 8], clear = error * s->clear, last = pti_last_start(start + clear);
+        const float error = 2 * s->error[lane / 8].v[lane % 8], clear = error * s->clear, last = pti_last_start(pti_last_start(start) + clear);
         if (s->inside[lane / 8].v[lane % 8] > error && fabsf(s->more[lane / 8].v[lane % 8]) > error && start > clear && 2 * start < s->end) {
             *limit = last < *limit ? last : *limit;
             e += at;
