@@ -4768,10 +4768,10 @@ static int pti_traverse(const pt_scene *scene, const pti_ray *r, pti_best *best,
    four times as fast (make bench-embree compares it with Embree). Eight boxes or triangles are tested at a time, one in each lane ([PT-01]).
 
    Lanes are float, and float cannot decide: [PT-06] decides in double, exactly. So a lane only asks whether a primitive
-   MAY be hit. It computes in float what [PT-06] computes in double, and a bound of the difference, and says no where
-   the bound allows no other answer. What is left, little more than one primitive for each hit, goes to [PT-06]. So
-   rounding costs time, never a hit: the wide tree, the binary tree and the linear search agree, and a lane may use
-   fused multiply-adds where there are some.
+   MAY be hit. It computes in float what [PT-06] computes in double, and a bound of the difference, and says no, or yes, where
+   the bound allows no other answer. What it does not deny, little more than one primitive for each hit, goes to [PT-06], or,
+   where it is certain, only through its arithmetic. So rounding costs time, never a hit: the wide tree, the binary tree and
+   the linear search agree, and a lane may use fused multiply-adds where there are some.
 
    Below, u = 2^-24 is the roundoff of float: each operation is off by u of its result. S is a length that no coordinate of
    a ray's origin and of the scene exceeds, and no way between them along an axis. It is kept between 2^-16 and 2^40: then no
@@ -4826,6 +4826,7 @@ typedef struct pti_sphere8 {
 #define PTI_PIECES 256
 #define PTI_WIDE_DEPTH 32   /* deeper down lists are halved, and end within 28 levels                      */
 #define PTI_WALL 0.1f       /* a leaf of more than a 30th of the surface of a cube around the scene is cut where that pays */
+#define PTI_FEW 33          /* for lists that are shorter, half of the bins do                             */
 
 /* Some boxes joined, and {-least, greatest} of twice their centres. */
 typedef struct pti_joined {
@@ -4853,16 +4854,17 @@ typedef struct pti_wide_builder {
     unsigned char *arena;   /* NULL while bytes are counted                                                */
     size_t used;            /* bytes of it                                                                 */
     pti_counter next;       /* node                                                                        */
-    float scale;            /* of lengths: keeps areas in range                                            */
+    float wall;             /* half of the surface of a wall                                               */
     uint32_t triangles, flats; /* lanes below these hold triangles, triangles and halves                   */
     uint32_t piece_size;
     int piece_count;
     pti_piece pieces[PTI_PIECES];
 } pti_wide_builder;
 
-static float pti_scaled_area(const pti_wide_builder *b, const float *v)
+/* Half of the surface of a box; with coordinates below 2^39 and counts below 2^29 no sum of costs overflows. */
+PTI_INLINE float pti_box_area(const float *v)
 {
-    const float x = (v[4] + v[0]) * b->scale, y = (v[5] + v[1]) * b->scale, z = (v[6] + v[2]) * b->scale;
+    const float x = v[4] + v[0], y = v[5] + v[1], z = v[6] + v[2];
     return x * y + y * z + z * x;
 }
 
@@ -4878,25 +4880,25 @@ typedef struct pti_wide_bins {
     uint32_t count[PTI_WIDE_BINS];
 } pti_wide_bins;
 
-/* The best plane between the bins of an axis, if it is better than *best; `few` boxes at least on each side. */
-static void pti_sweep_blocks(const pti_wide_builder *b, const pti_wide_bins *bins, uint32_t few, pti_parting p, pti_parting *best)
+/* The best plane between `count` bins of an axis, if it is better than *best; `few` boxes at least on each side. */
+static void pti_sweep_blocks(const pti_wide_bins *bins, int count, uint32_t few, pti_parting p, pti_parting *best)
 {
     float right[PTI_WIDE_BINS];
     pti_lanes box;
     uint32_t n = 0;
     int i;
     box.f = pti_f8_set(-HUGE_VALF);
-    for (i = PTI_WIDE_BINS - 1; i > 0; i--) {
+    for (i = count - 1; i > 0; i--) {
         box.f = pti_f8_max(box.f, bins->box[i].f);
         n += bins->count[i];
-        right[i] = n >= few ? pti_scaled_area(b, box.v) * (float)((n + 7) / 8) : HUGE_VALF;
+        right[i] = n >= few ? pti_box_area(box.v) * (float)((n + 7) / 8) : HUGE_VALF;
     }
     box.f = pti_f8_set(-HUGE_VALF);
-    for (n = 0, i = 1; i < PTI_WIDE_BINS; i++) {
+    for (n = 0, i = 1; i < count; i++) {
         box.f = pti_f8_max(box.f, bins->box[i - 1].f);
         n += bins->count[i - 1];
         if (n < few) continue;
-        p.cost = pti_scaled_area(b, box.v) * (float)((n + 7) / 8) + right[i];
+        p.cost = pti_box_area(box.v) * (float)((n + 7) / 8) + right[i];
         p.plane = (float)i;
         if (p.cost < best->cost) *best = p;
     }
@@ -4905,32 +4907,39 @@ static void pti_sweep_blocks(const pti_wide_builder *b, const pti_wide_bins *bin
 /* Improves on *best, a halving of infinite cost, if the centres differ. */
 static void pti_find_parting(const pti_wide_builder *b, uint32_t begin, uint32_t end, const float *centres, uint32_t few, pti_parting *best)
 {
+    const int count = end - begin < PTI_FEW ? PTI_WIDE_BINS / 2 : PTI_WIDE_BINS;
     pti_wide_bins bins[3];
     pti_parting p[3];
+    pti_lanes from, scale;  /* of lanes 4 to 6; the others take numbers that cost no time                  */
     uint32_t i;
     int k, j;
+    from.f = pti_f8_set(1);
+    scale.f = pti_f8_set(0);
     for (k = 0; k < 3; k++) {
         const float extent = centres[4 + k] + centres[k];
         p[k] = *best;
         p[k].axis = k;
         p[k].lo = -centres[k];
-        p[k].scale = extent > 1e-30f ? PTI_WIDE_BINS * (1 - 4 * PTI_U) / extent : 0; /* all fall below bin 16 */
-        for (j = 0; j < PTI_WIDE_BINS; j++) {
+        p[k].scale = extent > 1e-30f ? (float)count * (1 - 4 * PTI_U) / extent : 0; /* all fall below the last */
+        from.v[4 + k] = p[k].lo;
+        scale.v[4 + k] = p[k].scale;
+        for (j = 0; j < count; j++) {
             bins[k].box[j].f = pti_f8_set(-HUGE_VALF);
             bins[k].count[j] = 0;
         }
     }
     for (i = begin; i < end; i++) {
         const pti_f8 box = b->boxes[i].f;
-        const float *v = b->boxes[i].v;
+        pti_lanes place;
+        place.f = pti_f8_mul(pti_f8_sub(pti_f8_sub(box, pti_f8_swap(box)), from.f), scale.f);
         for (k = 0; k < 3; k++) {
-            const int bin = (int)((v[4 + k] - v[k] - p[k].lo) * p[k].scale);
+            const int bin = (int)place.v[4 + k];
             bins[k].box[bin].f = pti_f8_max(box, bins[k].box[bin].f);
             bins[k].count[bin]++;
         }
     }
     for (k = 0; k < 3; k++)
-        if (p[k].scale > 0) pti_sweep_blocks(b, &bins[k], few, p[k], best);
+        if (p[k].scale > 0) pti_sweep_blocks(&bins[k], count, few, p[k], best);
 }
 
 /* Moves what goes left to the front, without branches, and joins both sides; returns the first of the right. */
@@ -4972,7 +4981,7 @@ static void pti_collapse(const pti_wide_builder *b, pti_binary *n)
         for (j = 1; j < k; j++)
             if (l[j - 1] + r[k - j - 1] < best[k]) best[k] = l[j - 1] + r[k - j - 1];
     }
-    n->cost[0] = pti_scaled_area(b, box) + best[8];
+    n->cost[0] = pti_box_area(box) + best[8];
     for (k = 2; k <= 7; k++) n->cost[k - 1] = best[k] < n->cost[k - 2] ? best[k] : n->cost[k - 2];
 }
 
@@ -4983,7 +4992,7 @@ static void pti_build_binary(pti_wide_builder *b, uint32_t n, const pti_joined *
 {
     pti_binary *node = &b->nodes[n];
     const uint32_t begin = node->first, end = begin + node->count;
-    const float area = pti_scaled_area(b, all->box.v);
+    const float area = pti_box_area(all->box.v);
     const int mixed = n == 0 && b->flats > 0 && b->flats < end, few = node->count <= 8 && !mixed;
     pti_parting p = {-1, 0, 0, 0, HUGE_VALF, (node->count / 2 + 7) / 8 * 8};
     pti_joined side[2];
@@ -4994,7 +5003,7 @@ static void pti_build_binary(pti_wide_builder *b, uint32_t n, const pti_joined *
     }
     node->child = 0;
     for (k = 0; k < 7; k++) node->cost[k] = area;
-    if (few && (depth >= 8 || area < PTI_WALL)) return;
+    if (few && (depth >= 8 || area < b->wall)) return;
     if (pieces && n > 0 && !few && node->count <= b->piece_size && b->piece_count < PTI_PIECES) {
         const pti_piece piece = {n, depth, *all};
         b->pieces[b->piece_count++] = piece;
@@ -5147,7 +5156,7 @@ static void pti_build_nodes_of(pti_wide_builder *b, uint32_t lanes)
     pti_counter n;
     int k;
     for (k = 0; k < 3; k++) widest = all.box.v[4 + k] + all.box.v[k] > widest ? all.box.v[4 + k] + all.box.v[k] : widest;
-    b->scale = 1 / widest;
+    b->wall = PTI_WALL * widest * widest;
     b->piece_size = lanes / 64 > 4096 ? lanes / 64 : 4096;
     b->next = 1;
     b->nodes[0].first = 0;
@@ -5160,40 +5169,43 @@ static void pti_build_nodes_of(pti_wide_builder *b, uint32_t lanes)
         if (b->nodes[n].child) pti_collapse(b, &b->nodes[n]);
 }
 
-/* An arena, at a multiple of 64 bytes; a large one of 2 MiB, the size of a page of which few are enough. */
-static int pti_alloc_arena(pt_wide *wide, size_t bytes, void *user)
+/* Memory from a multiple of 64 bytes on; if it is much, of 2 MiB, the size of a page of which few are enough. *memory is what
+   is to be freed. */
+static void *pti_alloc_lines(size_t bytes, void **memory, void *user)
 {
     const size_t page = (size_t)1 << 21, step = bytes < 2 * page ? 64 : page;
-    wide->memory = bytes > SIZE_MAX - step ? NULL : pti_alloc(bytes + step, 1, user);
-    if (!wide->memory) return 0;
-    wide->arena = (unsigned char *)(((uintptr_t)wide->memory + step - 1) / step * step);
-    wide->bytes = bytes;
+    unsigned char *lines;
+    *memory = bytes > SIZE_MAX - step ? NULL : pti_alloc(bytes + step, 1, user);
+    if (!*memory) return NULL;
+    lines = (unsigned char *)(((uintptr_t)*memory + step - 1) / step * step);
 #ifdef MADV_HUGEPAGE
-    if (step == page) madvise(wide->arena, bytes / page * page, MADV_HUGEPAGE);
+    if (step == page) madvise(lines, bytes / page * page, MADV_HUGEPAGE);
 #endif
-    return 1;
+    return lines;
 }
 
 /* Over primitives of which `triangles` are triangles, then halves / 2 parallelograms, the rest spheres. 0 = no memory. */
 static int pti_build_wide_tree(const pt_scene *scene, pt_wide *wide, uint32_t triangles, uint32_t halves)
 {
     const uint32_t lanes = scene->primitive_count + halves / 2, nodes = lanes / 2 + 514;
-    void *user = scene->alloc_user, *memory = pti_alloc((size_t)lanes + 2 * (size_t)nodes + 2, sizeof(pti_lanes), user);
+    void *user = scene->alloc_user, *memory;
     pti_wide_builder b;
-    int ok = memory != NULL;
+    int ok;
     memset(&b, 0, sizeof b);
+    b.nodes = (pti_binary *)pti_alloc_lines(((size_t)lanes + 2 * (size_t)nodes) * sizeof(pti_lanes), &memory, user);
+    ok = b.nodes != NULL;
     if (ok) {
         b.scene = scene;
         b.triangles = wide->triangles = triangles;
         b.flats = triangles + halves;
-        b.nodes = (pti_binary *)(((uintptr_t)memory + 63) / 64 * 64);
         b.boxes = (pti_lanes *)(void *)(b.nodes + nodes);
         pti_build_nodes_of(&b, lanes);
         pti_write_tree(&b, 0);
-        ok = b.used / 64 < (size_t)1 << 29 && pti_alloc_arena(wide, b.used, user);
+        if (b.used / 64 < (size_t)1 << 29) b.arena = wide->arena = (unsigned char *)pti_alloc_lines(b.used, &wide->memory, user);
+        ok = b.arena != NULL;
     }
     if (ok) {
-        b.arena = wide->arena;
+        wide->bytes = b.used;
         b.used = 0;
         wide->root = pti_write_tree(&b, 0);
     }
@@ -5215,8 +5227,15 @@ typedef struct pti_ray8 {
     float sx, sy, across, edge, along;
 } pti_ray8;
 
-/* 0: a ray that is not finite or from beyond 2^40: the linear search takes it. A direction far from length 1 is measured in
-   its longest component, so that o/d does not overflow. */
+/* A direction far from length 1 is measured in its longest component, so that o/d does not overflow. Apart from what follows,
+   so that nothing of it is done for other rays. */
+static pt_vec3 pti_ray8_measure(const pti_ray *r)
+{
+    const double unit = fabs(r->d[r->kz]);
+    return pt_v3((pt_real)(r->d[0] / unit), (pt_real)(r->d[1] / unit), (pt_real)(r->d[2] / unit));
+}
+
+/* 0: a ray that is not finite or from beyond 2^40: the linear search takes it. */
 PTI_INLINE int pti_ray8_make(pti_ray8 *w, const pti_ray *r, float extent)
 {
     int k;
@@ -5228,9 +5247,12 @@ PTI_INLINE int pti_ray8_make(pti_ray8 *w, const pti_ray *r, float extent)
     w->reach = fabsf(w->d[0]) + fabsf(w->d[1]) + fabsf(w->d[2]);
     w->span = fabsf(w->o[0]) + fabsf(w->o[1]) + fabsf(w->o[2]) + extent + PTI_LEAST_SPAN;
     if (!(w->reach > 1e-6f && w->reach < 1e6f)) {
+        const pt_vec3 d = pti_ray8_measure(r);
         w->unit = fabs(r->d[r->kz]);
-        for (k = 0; k < 3; k++) w->d[k] = (float)(r->d[k] / w->unit);
-        w->reach = fabsf(w->d[0]) + fabsf(w->d[1]) + fabsf(w->d[2]);
+        w->d[0] = d.x;
+        w->d[1] = d.y;
+        w->d[2] = d.z;
+        w->reach = fabsf(d.x) + fabsf(d.y) + fabsf(d.z);
         if (!(w->reach < 4)) return 0; /* nor is NaN */
     }
     return w->span < PTI_MOST_SPAN && r->end == r->end;
@@ -5317,7 +5339,7 @@ typedef struct pti_edges8 {
    product, each rounded once, and by (1 + s) u |o| for the rounding of the origin: by D = (3 + 7 s) u S in all, as |z| <= S and
    |x| <= (1 + s) S. With M = X + D, X the largest |x| and |y|, factors of edge functions are at most M, so these are off by
    4 M (D + u M) <= E = K (X + D), K = (16 + 32 s) u S. */
-PTI_INLINE8 pti_edges8 pti_edge_lanes(const pti_triangle8 *p, const pti_ray *r, const pti_ray8 *w)
+PTI_INLINE8 void pti_edge_lanes(const pti_triangle8 *p, const pti_ray *r, const pti_ray8 *w, pti_edges8 *e)
 {
     const pti_f8 ox = pti_f8_set(w->o[r->kx]), oy = pti_f8_set(w->o[r->ky]), oz = pti_f8_set(w->o[r->kz]);
     const pti_f8 sx = pti_f8_set(w->sx), sy = pti_f8_set(w->sy);
@@ -5329,17 +5351,16 @@ PTI_INLINE8 pti_edges8 pti_edge_lanes(const pti_triangle8 *p, const pti_ray *r, 
     const pti_f8 by = pti_f8_nmadd(sy, bz, pti_f8_sub(pti_row(p->v[3], w->y), oy));
     const pti_f8 cy = pti_f8_nmadd(sy, cz, pti_f8_sub(pti_row(p->v[6], w->y), oy));
     const pti_f8 wide = pti_f8_max(pti_largest8(ax, bx, cx), pti_largest8(ay, by, cy));
-    pti_edges8 e;
-    e.az = az;
-    e.bz = bz;
-    e.cz = cz;
-    e.u = pti_edge8(cx, by, cy, bx);
-    e.v = pti_edge8(ax, cy, ay, cx);
-    e.w = pti_edge8(bx, ay, by, ax);
-    e.low = pti_f8_min(e.u, pti_f8_min(e.v, e.w));
-    e.high = pti_f8_max(e.u, pti_f8_max(e.v, e.w));
-    e.error = pti_f8_madd(wide, pti_f8_set(w->edge), pti_f8_set(w->edge * w->across));
-    return e;
+    const pti_f8 eu = pti_edge8(cx, by, cy, bx), ev = pti_edge8(ax, cy, ay, cx), ew = pti_edge8(bx, ay, by, ax);
+    e->az = az;
+    e->bz = bz;
+    e->cz = cz;
+    e->u = eu;
+    e->v = ev;
+    e->w = ew;
+    e->low = pti_f8_min(eu, pti_f8_min(ev, ew));
+    e->high = pti_f8_max(eu, pti_f8_max(ev, ew));
+    e->error = pti_f8_madd(wide, pti_f8_set(w->edge), pti_f8_set(w->edge * w->across));
 }
 
 /* Depth times determinant: t |d.z| |det| and, in *off, what it is off by; *det: |det|. With N = U a.z + V b.z + W c.z and the
@@ -5356,25 +5377,25 @@ PTI_INLINE8 pti_f8 pti_depth_lanes(const pti_edges8 *e, const pti_ray *r, const 
     return pti_f8_flip(depth, sum);
 }
 
-/* Which of eight triangles may be hit by the limit? *sure, where it is asked for: which certainly are; both bounds are at
-   least 100 times what pti_depth_error allows for. */
+/* Which of eight triangles may be hit by the limit? *sure: which certainly are; both bounds are at least 100 times what
+   pti_depth_error allows for. */
 PTI_INLINE unsigned pti_triangle_lanes(const pti_triangle8 *p, const pti_ray *r, const pti_ray8 *w, float limit, unsigned *sure)
 {
-    const pti_edges8 e = pti_edge_lanes(p, r, w);
-    const pti_f8 zero = pti_f8_set(0), one_side = pti_f8_max(pti_f8_add(e.low, e.error), pti_f8_sub(e.error, e.high));
-    unsigned lanes = pti_m8_bits(pti_f8_le(zero, one_side));
+    const pti_f8 zero = pti_f8_set(0);
+    pti_edges8 e;
+    unsigned lanes;
+    pti_edge_lanes(p, r, w, &e);
+    lanes = pti_m8_bits(pti_f8_le(zero, pti_f8_max(pti_f8_add(e.low, e.error), pti_f8_sub(e.error, e.high))));
     if (lanes) {
         const float flat = fabsf(w->d[r->kz]), end = limit * flat < 2 * w->span ? limit * flat : 2 * w->span;
         pti_f8 det, off;
         const pti_f8 depth = pti_depth_lanes(&e, r, w, &det, &off);
         const pti_f8 before = pti_f8_sub(pti_f8_madd(det, pti_f8_set(end), off), depth);
+        const pti_f8 last = pti_f8_mul(det, pti_f8_set(pti_ray8_before(limit) * flat)); /* det 0: may be NaN, not sure */
+        const pti_f8 clear = pti_f8_sub(pti_f8_min(depth, pti_f8_sub(last, depth)), pti_f8_add(off, off));
+        const pti_f8 inside = pti_f8_sub(pti_f8_max(e.low, pti_f8_sub(zero, e.high)), e.error);
         lanes &= pti_m8_bits(pti_f8_le(zero, pti_f8_min(before, pti_f8_add(depth, off))));
-        if (sure) {
-            const pti_f8 last = pti_f8_mul(det, pti_f8_set(pti_ray8_before(limit) * flat)); /* det 0: may be NaN, not sure */
-            const pti_f8 clear = pti_f8_sub(pti_f8_min(depth, pti_f8_sub(last, depth)), pti_f8_add(off, off));
-            const pti_f8 inside = pti_f8_sub(pti_f8_max(e.low, pti_f8_sub(zero, e.high)), e.error);
-            *sure = pti_m8_bits(pti_f8_lt(zero, pti_f8_min(inside, clear)));
-        }
+        *sure = pti_m8_bits(pti_f8_lt(zero, pti_f8_min(inside, clear)));
     }
     return lanes;
 }
@@ -5425,7 +5446,7 @@ PTI_INLINE void pti_fetch(const unsigned char *p)
 
 PTI_INLINE pti_waiting pti_child(const pt_wide *tree, const pti_node8 *n, int i, const pti_lanes *begin)
 {
-    pti_fetch(pti_place(tree, n->child[i]));
+    pti_fetch(tree->arena + ((size_t)n->child[i] << 3));
     return (uint64_t)begin->bits[i] << 32 | n->child[i];
 }
 
@@ -5451,27 +5472,58 @@ PTI_INLINE pti_d3 pti_shear_lane(const pti_ray *r, const float *v)
     return pti_shear_axes(r, v[8 * r->kx], v[8 * r->ky], v[8 * r->kz]);
 }
 
+/* pti_edge where the products differ. */
+PTI_INLINE double pti_sure_edge(double a, double b, double c, double d)
+{
+    double p = a * b, q = c * d;
+    PTI_FENCE(p);
+    PTI_FENCE(q);
+    return p - q;
+}
+
+/* Keeps what is hit for certain, if it is nearer than the best: the numbers of pti_sheared_triangle without its questions.
+   half: 1 or 2 for the halves of a parallelogram, with its u and v; 0 for a triangle. */
+PTI_INLINE int pti_keep_sure(pti_d3 a, pti_d3 b, pti_d3 c, int half, int id, pti_best *best)
+{
+    const double u = pti_sure_edge(c.x, b.y, c.y, b.x), v = pti_sure_edge(a.x, c.y, a.y, c.x), w = pti_sure_edge(b.x, a.y, b.y, a.x);
+    const double det = u + v + w;
+    double p = u * a.z, q = v * b.z, depth = w * c.z, b1, b2;
+    PTI_FENCE(p);
+    PTI_FENCE(q);
+    PTI_FENCE(depth);
+    depth = (depth + (p + q)) / det;
+    if (!(depth < pti_before(best, id))) return 0;
+    b1 = v / det;
+    b2 = w / det;
+    return pti_keep(best, id, depth, half == 1 ? b1 + b2 : b1, half == 2 ? b1 + b2 : b2);
+}
+
 /* Tests a lane as pti_test does; the corners of a triangle are at hand. */
-PTI_INLINE int pti_test_lane(const pt_scene *scene, const pti_ray *r, const pti_triangle8 *p, int i, pti_best *best)
+PTI_INLINE int pti_test_lane(const pt_scene *scene, const pti_ray *r, const pti_triangle8 *p, int i, int sure, pti_best *best)
 {
     const int id = (int)p->id[i];
+    pti_d3 a, b, c;
     double t, u, v;
     if (id >= (int)scene->wide.triangles) return pti_test(scene, r, id, best);
-    return pti_sheared_triangle(r, pti_shear_lane(r, &p->v[0][i]), pti_shear_lane(r, &p->v[3][i]), pti_shear_lane(r, &p->v[6][i]),
-                                pti_before(best, id), &t, &u, &v) && pti_keep(best, id, t, u, v);
+    a = pti_shear_lane(r, &p->v[0][i]);
+    b = pti_shear_lane(r, &p->v[3][i]);
+    c = pti_shear_lane(r, &p->v[6][i]);
+    if (sure) return pti_keep_sure(a, b, c, 0, id, best);
+    return pti_sheared_triangle(r, a, b, c, pti_before(best, id), &t, &u, &v) && pti_keep(best, id, t, u, v);
 }
 
 PTI_INLINE int pti_test_leaf(const pt_scene *scene, uint32_t leaf, const pti_ray *r, const pti_ray8 *w, float limit, pti_best *best, int any)
 {
     const void *p = pti_place(&scene->wide, leaf);
     const int flat = (leaf & 7) == PTI_TRIANGLES;
-    unsigned sure = 0, lanes = flat ? pti_triangle_lanes((const pti_triangle8 *)p, r, w, limit, any ? &sure : NULL)
+    unsigned sure = 0, lanes = flat ? pti_triangle_lanes((const pti_triangle8 *)p, r, w, limit, &sure)
                                     : pti_m8_bits(pti_f8_le(pti_sphere_lanes((const pti_sphere8 *)p, w), pti_f8_set(limit)));
     int found = 0;
     if (any && sure) return 1;
     for (; lanes; lanes &= lanes - 1) {
         const int i = pti_lowest_bit(lanes);
-        found |= flat ? pti_test_lane(scene, r, (const pti_triangle8 *)p, i, best) : pti_test(scene, r, (int)((const pti_sphere8 *)p)->id[i], best);
+        found |= flat ? pti_test_lane(scene, r, (const pti_triangle8 *)p, i, sure >> i & 1, best)
+                      : pti_test(scene, r, (int)((const pti_sphere8 *)p)->id[i], best);
         if (any && found) return 1;
     }
     return found;
@@ -5488,7 +5540,7 @@ PTI_INLINE int pti_traverse_wide(const pt_scene *scene, const pti_ray *r, const 
     memcpy(&limit_bits, &limit, sizeof limit_bits);
     for (;;) {
         if ((at & 7) == PTI_NODE) {
-            const pti_node8 *n = (const pti_node8 *)(const void *)pti_place(tree, at);
+            const pti_node8 *n = (const pti_node8 *)(const void *)(tree->arena + ((size_t)at << 3)); /* PTI_NODE is 0 */
             pti_lanes begin;
             const unsigned lanes = pti_node_lanes(n, w, limit, &begin);
             if (lanes & (lanes - 1)) {
@@ -5497,7 +5549,7 @@ PTI_INLINE int pti_traverse_wide(const pt_scene *scene, const pti_ray *r, const 
             }
             if (lanes) {
                 at = n->child[pti_lowest_bit(lanes)];
-                pti_fetch(pti_place(tree, at));
+                pti_fetch(tree->arena + ((size_t)at << 3));
                 continue;
             }
         } else if (pti_test_leaf(scene, at, r, w, limit, best, any)) {
@@ -5531,18 +5583,18 @@ typedef struct pti_plane8 {
     float both[8];          /* 1 for a parallelogram, else 0                                               */
 } pti_plane8;
 
-/* What to test: a flat primitive with its corners or, with 0 of them, a sphere. */
+/* What to test: a primitive and, of a flat one, the corners of it or of a half. */
 typedef struct pti_tested {
-    pt_vec3 corner[4];
-    int corners, id;
-    uint32_t unused[2];
+    pt_vec3 corner[3];
+    int id, half;           /* 1, 2: of a parallelogram                                                    */
+    uint32_t unused[5];
 } pti_tested;
 
 /* tested[PTI_SMALL + i]: the half of lane i where v > u. */
 typedef struct pti_small {
     pti_plane8 planes[PTI_SMALL / 8];
     pti_sphere8 spheres[PTI_SMALL / 8];
-    uint32_t tag[PTI_SMALL]; /* 0, 1, 2, ...                                                                */
+    pti_lanes tag[PTI_SMALL / 4]; /* bits 0, 1, 2, ...: numbers of what is tested                           */
     pti_tested tested[2 * PTI_SMALL];
 } pti_small;
 
@@ -5596,18 +5648,23 @@ static uint32_t pti_write_flat(const pt_scene *scene, pti_small *out, uint32_t l
     pti_tested *a = &out->tested[lane], *b = &out->tested[PTI_SMALL + lane];
     pti_plane8 *plane = &out->planes[lane / 8];
     const int there = i < flats;
-    pt_vec3 all[4];
-    a->id = (int)(there ? i : flats - 1);
-    a->corners = pti_corners(scene, &scene->primitives[a->id], a->corner);
-    *b = *a;
-    if (a->corners == 3 && i + 1 < flats && pti_corners(scene, &scene->primitives[i + 1], b->corner) == 3 &&
-        pti_is_parallelogram(a->corner, b->corner, (double)scene->wide.extent, all)) {
+    pt_vec3 c[4], d[4], all[4];
+    int corners;
+    a->id = b->id = (int)(there ? i : flats - 1);
+    corners = pti_corners(scene, &scene->primitives[a->id], c);
+    a->half = corners == 4 ? 1 : 0;
+    b->half = 2 * a->half;
+    memcpy(a->corner, c, sizeof a->corner);
+    memcpy(b->corner, c, sizeof b->corner);
+    if (b->half) memcpy(b->corner + 1, c + 2, 2 * sizeof *c);
+    if (corners == 3 && i + 1 < flats && pti_corners(scene, &scene->primitives[i + 1], d) == 3 &&
+        pti_is_parallelogram(c, d, (double)scene->wide.extent, all)) {
         b->id++;
+        memcpy(b->corner, d, sizeof b->corner);
         pti_write_plane(plane, lane % 8, all, 4, 1);
         return 2;
     }
-    *b = *a;
-    pti_write_plane(plane, lane % 8, a->corner, a->corners, there);
+    pti_write_plane(plane, lane % 8, c, corners, there);
     return 1;
 }
 
@@ -5615,17 +5672,17 @@ static uint32_t pti_write_flat(const pt_scene *scene, pti_small *out, uint32_t l
 static int pti_build_small(const pt_scene *scene, pt_wide *wide, uint32_t flats)
 {
     const uint32_t count = scene->primitive_count;
-    pti_small *out;
+    pti_small *out = (pti_small *)pti_alloc_lines(sizeof *out, &wide->memory, scene->alloc_user);
     uint32_t i, lane = 0;
-    if (!pti_alloc_arena(wide, sizeof *out, scene->alloc_user)) return 0;
-    out = (pti_small *)(void *)wide->arena;
-    for (i = 0; i < PTI_SMALL; i++) out->tag[i] = i;
+    if (!out) return 0;
+    wide->arena = (unsigned char *)out;
+    wide->bytes = sizeof *out;
+    for (i = 0; i < 2 * PTI_SMALL; i++) out->tag[i / 8].bits[i % 8] = i;
     for (i = 0; i < flats || lane % 8 > 0; lane++) i += pti_write_flat(scene, out, lane, i, flats);
     wide->plane_blocks = (int)(lane / 8);
     for (i = 0; flats + i < count || i % 8 > 0; i++, lane++) {
         const uint32_t id = flats + i < count ? flats + i : count - 1;
-        out->tested[lane].id = (int)id;
-        out->tested[lane].corners = 0;
+        out->tested[lane].id = out->tested[PTI_SMALL + lane].id = (int)id;
         pti_write_sphere(scene, &out->spheres[i / 8], i % 8, id, flats + i < count);
     }
     wide->sphere_blocks = (int)(i / 8);
@@ -5654,16 +5711,15 @@ PTI_INLINE pti_f8 pti_dot8(const float rows[4][8], pti_f8 x, pti_f8 y, pti_f8 z,
     return pti_f8_madd(pti_f8_load(rows[0]), x, pti_f8_madd(pti_f8_load(rows[1]), y, pti_f8_madd(pti_f8_load(rows[2]), z, w)));
 }
 
-/* What eight planes say: where they begin, as spheres do; v - u; a bound of the error of u, of v and of w; and, > 0: it is hit
-   for certain, within the limit. */
+/* What eight planes say: t and how far it may be off (X); the least weight, v - u, and a bound of the error of u, v and w. */
 typedef struct pti_planes8 {
-    pti_f8 start, more, error, margin;
+    pti_f8 t, off, inside, more, error;
 } pti_planes8;
 
 /* n.o + n3 is off by 36 u S (9 of these for the rounded corners of a parallelogram), n.d by 14 u m, so t by X = 96 u S / |n.d|.
    As |n.d| <= m, m X is at least 96 u S: so u, v and w are off by at most 3 G m X. Nothing is said of a lane where n is
    not known or where numbers overflow: NaN is not < 0. */
-PTI_INLINE8 pti_planes8 pti_plane_lanes(const pti_plane8 *p, const pti_ray8 *w, float limit, int any)
+PTI_INLINE8 void pti_plane_lanes(const pti_plane8 *p, const pti_ray8 *w, pti_planes8 *h)
 {
     const pti_f8 ox = pti_f8_set(w->o[0]), oy = pti_f8_set(w->o[1]), oz = pti_f8_set(w->o[2]), zero = pti_f8_set(0);
     const pti_f8 dx = pti_f8_set(w->d[0]), dy = pti_f8_set(w->d[1]), dz = pti_f8_set(w->d[2]), one = pti_f8_set(1);
@@ -5672,110 +5728,147 @@ PTI_INLINE8 pti_planes8 pti_plane_lanes(const pti_plane8 *p, const pti_ray8 *w, 
     const pti_f8 u = pti_f8_madd(t, pti_dot8(p->u, dx, dy, dz, zero), pti_dot8(p->u, ox, oy, oz, pti_f8_load(p->u[3])));
     const pti_f8 v = pti_f8_madd(t, pti_dot8(p->v, dx, dy, dz, zero), pti_dot8(p->v, ox, oy, oz, pti_f8_load(p->v[3])));
     const pti_f8 less = pti_f8_min(u, v), rest = pti_f8_madd(pti_f8_load(p->both), less, pti_f8_sub(pti_f8_sub(one, u), v));
-    const pti_f8 off = pti_f8_mul(pti_f8_abs(inverse), pti_f8_set(96 * PTI_U * w->span)), inside = pti_f8_min(less, rest);
-    pti_planes8 h;
-    h.more = pti_f8_sub(v, u);
-    h.error = pti_f8_mul(off, pti_f8_mul(pti_f8_load(p->steep), pti_f8_set(3 * w->reach)));
-    h.start = pti_f8_max(pti_f8_sub(t, off), pti_f8_set(PTI_SOON));
-    h.start = pti_f8_select(pti_f8_lt(pti_f8_min(pti_f8_add(inside, h.error), pti_f8_add(t, off)), zero), pti_f8_set(PTI_NEVER), h.start);
-    h.margin = zero;
-    if (any) {
-        const pti_f8 clear = pti_f8_mul(h.error, pti_f8_set(2 * w->span / w->reach)), end = pti_f8_set(pti_ray8_before(limit));
-        h.margin = pti_f8_sub(pti_f8_min(t, pti_f8_sub(end, t)), clear);
-        h.margin = pti_f8_min(h.margin, pti_f8_sub(inside, pti_f8_add(h.error, h.error)));
-    }
-    return h;
+    const pti_f8 off = pti_f8_mul(pti_f8_abs(inverse), pti_f8_set(96 * PTI_U * w->span));
+    h->t = t;
+    h->off = off;
+    h->inside = pti_f8_min(less, rest);
+    h->more = pti_f8_sub(v, u);
+    h->error = pti_f8_mul(off, pti_f8_mul(pti_f8_load(p->steep), pti_f8_set(3 * w->reach)));
 }
 
-/* x >= 0 with its lowest seven bits replaced by a tag below 64, and by 64 more where m holds. */
-PTI_INLINE pti_f8 pti_f8_tag(pti_f8 x, const uint32_t *tag, pti_m8 m)
+/* Where they begin, as spheres do. */
+PTI_INLINE pti_f8 pti_plane_starts(const pti_planes8 *h)
 {
-#if PTI_LANES == 2
-    const __m256 high = _mm256_castsi256_ps(_mm256_set1_epi32(~127)), more = _mm256_castsi256_ps(_mm256_set1_epi32(64));
-    return _mm256_or_ps(_mm256_or_ps(_mm256_and_ps(x, high), _mm256_and_ps(m, more)), pti_f8_load((const float *)(const void *)tag));
-#elif PTI_LANES == 1
-    const __m128 high = _mm_castsi128_ps(_mm_set1_epi32(~127)), more = _mm_castsi128_ps(_mm_set1_epi32(64));
-    const pti_f8 t = pti_f8_load((const float *)(const void *)tag);
-    return pti_f8_pair(_mm_or_ps(_mm_or_ps(_mm_and_ps(x.a, high), _mm_and_ps(m.a, more)), t.a),
-                       _mm_or_ps(_mm_or_ps(_mm_and_ps(x.b, high), _mm_and_ps(m.b, more)), t.b));
-#else
-    uint32_t bits[8];
-    int i;
-    memcpy(bits, x.v, sizeof bits);
-    for (i = 0; i < 8; i++) bits[i] = (bits[i] & ~(uint32_t)127) | ((uint32_t)m.v[i] & 64) | tag[i];
-    memcpy(x.v, bits, sizeof bits);
-    return x;
-#endif
+    const pti_f8 seen = pti_f8_min(pti_f8_add(h->inside, h->error), pti_f8_add(h->t, h->off));
+    return pti_f8_select(pti_f8_lt(seen, pti_f8_set(0)), pti_f8_set(PTI_NEVER), pti_f8_max(pti_f8_sub(h->t, h->off), pti_f8_set(PTI_SOON)));
 }
+
+/* Which may be hit by the limit? *margin > 0: is hit for certain. A hit is at t <= 3 S / m, and 2 G S >= 1, for no edge is
+   longer than 2 S along an axis: so what t must be clear of, with clear = 2 S / m times the error of weights, is at least
+   288 u S / m and 3 X, which is more than the limit was rounded by. */
+PTI_INLINE unsigned pti_planes_within(const pti_planes8 *h, float limit, float clear, pti_f8 *margin)
+{
+    const pti_f8 within = pti_f8_min(h->t, pti_f8_sub(pti_f8_set(limit), h->t));
+    const pti_f8 seen = pti_f8_min(pti_f8_add(h->inside, h->error), pti_f8_add(within, h->off));
+    *margin = pti_f8_min(pti_f8_nmadd(h->error, pti_f8_set(clear), within), pti_f8_nmadd(h->error, pti_f8_set(2), h->inside));
+    return 255 ^ pti_m8_bits(pti_f8_lt(seen, pti_f8_set(0)));
+}
+
+/* x >= 0 with its lowest seven bits replaced by those of a tag. */
+PTI_INLINE float pti_tagged(float x, float tag)
+{
+    uint32_t a, b;
+    memcpy(&a, &x, sizeof a);
+    memcpy(&b, &tag, sizeof b);
+    a = (a & ~(uint32_t)127) | b;
+    memcpy(&x, &a, sizeof x);
+    return x;
+}
+PTI_F8(pti_f8, pti_f8_tag, _mm256_or_ps(_mm256_and_ps(x, _mm256_castsi256_ps(_mm256_set1_epi32(~127))), y),
+       _mm_or_ps(_mm_and_ps(x, _mm_castsi128_ps(_mm_set1_epi32(~127))), y), pti_tagged(x, y))
 
 /* The latest start of what is hit by a limit: 127 units of the last place are at most 2^-16 of it. */
 PTI_INLINE float pti_last_start(float limit) { return limit + limit * (256 * PTI_U); }
 
-/* Where the lanes begin, block by block. The lowest seven bits of a start are the entry that is to be tested: so no two are
-   equal, and the least of them says who it is. */
+/* Where the lanes begin, block by block, and what planes say. The lowest seven bits of a start are the number of what is to be
+   tested: so no two are equal, and the least of them says who it is. */
 typedef struct pti_starts {
-    pti_lanes t[PTI_SMALL / 8], more[PTI_SMALL / 8], error[PTI_SMALL / 8];
-    int count;
+    pti_lanes t[PTI_SMALL / 8], inside[PTI_SMALL / 8], more[PTI_SMALL / 8], error[PTI_SMALL / 8];
+    float clear, end;       /* S / m; where no hit is known                                                */
+    int planes, count;
 } pti_starts;
 
-/* The first start behind `last`. */
-PTI_INLINE float pti_next_start(const pti_starts *s, float last)
+/* The first start behind `last`; what is beyond the limit is not looked for. */
+PTI_INLINE float pti_next_start(const pti_starts *s, float last, float limit)
 {
     const pti_f8 none = pti_f8_set(HUGE_VALF), from = pti_f8_set(last);
     pti_f8 least = none;
     int i;
     for (i = 0; i < s->count; i++) least = pti_f8_min(least, pti_f8_select(pti_f8_lt(from, s->t[i].f), s->t[i].f, none));
-    return pti_f8_least(least);
+    return pti_m8_bits(pti_f8_le(least, pti_f8_set(limit))) ? pti_f8_least(least) : HUGE_VALF;
 }
 
-/* Tests the entry that a start tells of and, near the diagonal of two triangles, the other, too. */
-PTI_INLINE int pti_test_start(const pt_scene *scene, const pti_ray *r, const pti_starts *s, float start, pti_best *best)
+/* Tests all of a lane. */
+static int pti_test_both(const pt_scene *scene, const pti_ray *r, const pti_tested *e, pti_best *best)
 {
-    const pti_small *small = (const pti_small *)(const void *)scene->wide.arena;
-    const pti_tested *e;
-    uint32_t at;
-    int hit;
+    const int hit = pti_test(scene, r, e->id, best);
+    return e[PTI_SMALL].id == e->id ? hit : hit | pti_test(scene, r, e[PTI_SMALL].id, best);
+}
+
+/* Tests what a start tells of if that is certain, as pti_planes_within has it, else all of its lane. As t is at most start + 2 X
+   then, apart from the tag, *limit, of starts, does not have to wait for numbers in double: 2 X < clear < start. */
+PTI_INLINE int pti_test_start(const pt_scene *scene, const pti_ray *r, const pti_ray8 *w, const pti_starts *s, float start, float *limit, pti_best *best)
+{
+    const pti_tested *e = ((const pti_small *)(const void *)scene->wide.arena)->tested;
+    uint32_t at, lane;
     memcpy(&at, &start, sizeof at);
     at %= 2 * PTI_SMALL;
-    e = &small->tested[at];
-    if (e->corners == 0) return pti_test(scene, r, e->id, best);
-    hit = pti_test_flat(r, e->corner, e->corners, e->id, best);
-    if (fabsf(s->more[at % PTI_SMALL / 8].v[at % 8]) > 2 * s->error[at % PTI_SMALL / 8].v[at % 8]) return hit;
-    e = &small->tested[at ^ PTI_SMALL];
-    return hit | pti_test_flat(r, e->corner, e->corners, e->id, best);
+    lane = at % PTI_SMALL;
+    if ((int)lane / 8 < s->planes) {
+        const float error = 2 * s->error[lane / 8].v[lane % 8], clear = error * s->clear, last = pti_last_start(pti_last_start(start) + clear);
+        if (s->inside[lane / 8].v[lane % 8] > error && fabsf(s->more[lane / 8].v[lane % 8]) > error && start > clear && 2 * start < s->end) {
+            *limit = last < *limit ? last : *limit;
+            e += at;
+            return pti_keep_sure(pti_shear(r, &e->corner[0]), pti_shear(r, &e->corner[1]), pti_shear(r, &e->corner[2]), e->half, e->id, best);
+        }
+    }
+    if (!pti_test_both(scene, r, e + lane, best)) return 0;
+    *limit = pti_last_start(pti_ray8_limit(w, best->t));
+    return 1;
 }
 
-PTI_INLINE int pti_search_small(const pt_scene *scene, const pti_ray *r, const pti_ray8 *w, pti_best *best, int any)
+/* The nearest, in the order of starts. */
+PTI_INLINE int pti_nearest_small(const pt_scene *scene, const pti_ray *r, const pti_ray8 *w, pti_best *best)
 {
     const pti_small *small = (const pti_small *)(const void *)scene->wide.arena;
-    const int planes = scene->wide.plane_blocks, spheres = scene->wide.sphere_blocks;
-    const float end = pti_ray8_limit(w, best->t);
     const pti_f8 zero = pti_f8_set(0);
-    pti_f8 least = pti_f8_set(HUGE_VALF), margin = zero;
+    pti_f8 least = pti_f8_set(HUGE_VALF);
+    pti_planes8 h;
     pti_starts s;
-    float start, limit = pti_last_start(end);
+    float start, limit;
     int found = 0, i;
-    for (i = 0; i < planes; i++) {
-        const pti_planes8 h = pti_plane_lanes(&small->planes[i], w, end, any);
-        s.t[i].f = pti_f8_tag(h.start, small->tag + 8 * i, pti_f8_lt(zero, h.more));
+    s.clear = w->span / w->reach;
+    s.end = pti_ray8_limit(w, best->t);
+    limit = pti_last_start(s.end);
+    s.planes = scene->wide.plane_blocks;
+    s.count = s.planes + scene->wide.sphere_blocks;
+    for (i = 0; i < s.planes; i++) {
+        pti_plane_lanes(&small->planes[i], w, &h);
+        s.t[i].f = pti_f8_tag(pti_plane_starts(&h), pti_f8_select(pti_f8_lt(zero, h.more), small->tag[PTI_SMALL / 8 + i].f, small->tag[i].f));
+        s.inside[i].f = h.inside;
         s.more[i].f = h.more;
         s.error[i].f = h.error;
         least = pti_f8_min(least, s.t[i].f);
-        margin = pti_f8_max(h.margin, margin);
     }
-    if (any && pti_m8_bits(pti_f8_lt(zero, margin))) return 1;
-    for (i = 0; i < spheres; i++) {
-        s.t[planes + i].f = pti_f8_tag(pti_sphere_lanes(&small->spheres[i], w), small->tag + 8 * (planes + i), pti_f8_lt(zero, zero));
-        least = pti_f8_min(least, s.t[planes + i].f);
+    for (; i < s.count; i++) {
+        s.t[i].f = pti_f8_tag(pti_sphere_lanes(&small->spheres[i - s.planes], w), small->tag[i].f);
+        least = pti_f8_min(least, s.t[i].f);
     }
-    s.count = planes + spheres;
-    for (start = pti_f8_least(least); start <= limit; start = pti_next_start(&s, start)) {
-        if (!pti_test_start(scene, r, &s, start, best)) continue;
-        if (any) return 1;
-        found = 1;
-        limit = pti_last_start(pti_ray8_limit(w, best->t));
-    }
+    for (start = pti_f8_least(least); start <= limit; start = pti_next_start(&s, start, limit))
+        found |= pti_test_start(scene, r, w, &s, start, &limit, best);
     return found;
+}
+
+/* Any, in no order. */
+PTI_INLINE int pti_any_small(const pt_scene *scene, const pti_ray *r, const pti_ray8 *w, pti_best *best)
+{
+    const pti_small *small = (const pti_small *)(const void *)scene->wide.arena;
+    const int planes = scene->wide.plane_blocks, count = planes + scene->wide.sphere_blocks;
+    const float end = pti_ray8_limit(w, best->t), clear = 2 * w->span / w->reach;
+    pti_f8 sure = pti_f8_set(0), margin;
+    pti_planes8 h;
+    uint64_t may = 0;
+    int i;
+    for (i = 0; i < planes; i++) {
+        pti_plane_lanes(&small->planes[i], w, &h);
+        may |= (uint64_t)pti_planes_within(&h, end, clear, &margin) << 8 * i;
+        sure = pti_f8_max(margin, sure);
+    }
+    if (pti_m8_bits(pti_f8_lt(pti_f8_set(0), sure))) return 1;
+    for (; i < count; i++) may |= (uint64_t)pti_m8_bits(pti_f8_le(pti_sphere_lanes(&small->spheres[i - planes], w), pti_f8_set(end))) << 8 * i;
+    for (i = 0; i < PTI_SMALL && may >> i; i++)
+        if ((may >> i & 1) && pti_test_both(scene, r, &small->tested[i], best)) return 1;
+    return 0;
 }
 
 /* What pti_search calls: the nearest hit or any; -1: not a ray for lanes. */
@@ -5783,7 +5876,7 @@ PTI_INLINE int pti_search_wide(const pt_scene *scene, const pti_ray *r, pti_best
 {
     pti_ray8 w;
     if (!pti_ray8_make(&w, r, scene->wide.extent)) return -1;
-    if (scene->wide.plane_blocks + scene->wide.sphere_blocks > 0) return pti_search_small(scene, r, &w, best, any);
+    if (scene->wide.plane_blocks + scene->wide.sphere_blocks > 0) return any ? pti_any_small(scene, r, &w, best) : pti_nearest_small(scene, r, &w, best);
     pti_ray8_for_tree(&w, r);
     return pti_traverse_wide(scene, r, &w, best, any);
 }

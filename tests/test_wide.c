@@ -124,13 +124,13 @@ static void lanes_together(void)
         {
             pti_lanes aligned;
             memcpy(aligned.bits, tag, sizeof tag);
-            tagged.f = pti_f8_tag(x.f, aligned.bits, pti_f8_lt(y.f, z.f));
+            tagged.f = pti_f8_tag(x.f, aligned.f);
         }
         for (k = 0; k < 8; k++) {
             const double bound = 2e-7 * (fabs((double)x.v[k] * (double)y.v[k]) + fabs((double)z.v[k]));
             wrong += fabs((double)fused.v[k] - ((double)x.v[k] * (double)y.v[k] + (double)z.v[k])) > bound;
             wrong += fabs((double)negative.v[k] - ((double)z.v[k] - (double)x.v[k] * (double)y.v[k])) > bound;
-            wrong += tagged.bits[k] != ((x.bits[k] & ~127u) | tag[k] | (y.v[k] < z.v[k] ? 64u : 0u));
+            wrong += tagged.bits[k] != ((x.bits[k] & ~127u) | tag[k]);
         }
     }
     pt_check(wrong == 0, "lanes together", "%d are wrong: madd, nmadd, least or tag", wrong);
@@ -464,11 +464,12 @@ static void bounds_of_block(const pti_triangle8 *p, const pti_ray *r, const pti_
 {
     const double end = r->end < 3e38 ? r->end : 3e38;
     const float limit = pti_ray8_limit(w, end);
-    const pti_edges8 e = pti_edge_lanes(p, r, w);
+    pti_edges8 e;
     pti_lanes u, v, x, error, t, det, off;
     unsigned sure = 0, may;
     pti_f8 bound, all;
     int i;
+    pti_edge_lanes(p, r, w, &e);
     u.f = e.u;
     v.f = e.v;
     x.f = e.w;
@@ -549,26 +550,28 @@ static void bounds_of_planes(void)
             const unsigned block = pt_pcg32_next(&rng) % (unsigned)s.wide.plane_blocks;
             pti_lanes start, more, error, margin;
             pti_planes8 h;
+            pti_f8 sure;
+            unsigned may;
             pti_ray8 w;
             double end;
             if (!pti_ray8_make(&w, &r, s.wide.extent)) continue;
             end = r.end < 3e38 ? r.end : 3e38;
-            h = pti_plane_lanes(&small->planes[block], &w, pti_ray8_limit(&w, end), 1);
-            start.f = h.start;
+            pti_plane_lanes(&small->planes[block], &w, &h);
+            start.f = pti_plane_starts(&h);
+            may = pti_planes_within(&h, pti_ray8_limit(&w, end), 2 * w.span / w.reach, &sure);
             more.f = h.more;
             error.f = h.error;
-            margin.f = h.margin;
+            margin.f = sure;
             for (lane = 0; lane < 8; lane++) {
                 const pti_tested *a = &small->tested[8 * block + lane], *b = &small->tested[PTI_SMALL + 8 * block + lane];
                 pti_best best = {end, 0, 0, -1};
-                int hit = pti_test_flat(&r, a->corner, a->corners, a->id, &best);
-                hit |= pti_test_flat(&r, b->corner, b->corners, b->id, &best);
+                const int hit = pti_test_both(&s, &r, a, &best);
                 sum.sure += margin.v[lane] > 0;
-                sum.wrong += !hit && margin.v[lane] > 0;
+                sum.wrong += (!hit && margin.v[lane] > 0) || (hit && small->planes[block].steep[lane] > 0 && !(may >> lane & 1));
                 if (!hit || error.v[lane] - error.v[lane] != 0 || small->planes[block].steep[lane] <= 0) continue; /* no bound, or empty */
                 sum.planes++;
                 sum.wrong += (double)start.v[lane] > best.t * w.unit;
-                if (a->corners == 4) sum.plane = ratio((double)more.v[lane] - (best.v - best.u), 2 * (double)error.v[lane], sum.plane);
+                if (a->half) sum.plane = ratio((double)more.v[lane] - (best.v - best.u), 2 * (double)error.v[lane], sum.plane);
                 if (a->id == b->id) continue;
                 sum.wrong += fabsf(more.v[lane]) > 2 * error.v[lane] && best.primitive != (more.v[lane] > 0 ? b->id : a->id);
             }
