@@ -1,14 +1,16 @@
 /* report.c - error against run time for every canonical scene: which method and which points are worth their seconds?
 
    build:  cc -O2 -ffp-contract=off -I. tests/bench/report.c -o report -lm -pthread
-   run:    ./report DIRECTORY [--seconds S] [--scene NAME] [--method NAME] [--size N]
+   run:    ./report DIRECTORY [--seconds S] [--scene NAME] [--method NAME] [--size N] [--flags TEXT]
 
    Each scene is rendered with every method and sampler at 1, 2, 4, ... samples per pixel, each time with other random
    numbers (rows of one render share their samples, and would make every order look better than it is). The error is
    the true one, against a reference that is rendered when it is missing and kept in DIRECTORY/references; its own
-   error is subtracted. --seconds is about how long all of it takes (60); times are CPU seconds of one thread.
+   error is subtracted. --seconds is about how long all of that takes (60); times are CPU seconds of one thread. Without
+   --scene, cost against size comes on top: meshes of 10^2 to 10^7 triangles, within 8 GiB. --flags says on the page how
+   this program was compiled.
 
-   Writes DIRECTORY/index.html, error_vs_time.csv, and the plots and pictures that the page shows.
+   Writes DIRECTORY/index.html, error_vs_time.csv, cost.csv, and the plots and pictures that the page shows.
 
    Exit status: 0, or 1 if a scene could not be rendered or a file not be written. */
 
@@ -34,6 +36,7 @@ typedef struct curve {
     pt_sampler_kind sampler;
     int single_net;              /* all samples in one half: no error estimate, better points              */
     char label[48], file[64];
+    const char *body;            /* of the integrator, that the driver chose                               */
     int count;
     uint32_t spp[MAX_ROWS];
     double seconds[MAX_ROWS], relmse[MAX_ROWS], rmse[MAX_ROWS], estimated[MAX_ROWS];
@@ -49,11 +52,11 @@ typedef struct reference {
 } reference;
 
 typedef struct job {
-    const char *directory, *only_scene, *only_method;
+    const char *directory, *only_scene, *only_method, *flags;
     double seconds;              /* of one curve: its last render takes about half of them                 */
     double reference_seconds;
     int size;
-    FILE *csv, *html;
+    FILE *csv, *cost, *html;
     int failed;
 } job;
 
@@ -241,6 +244,7 @@ static int add_row(const job *j, const pt_scene *scene, const pt_camera *camera,
         c->estimated[c->count] = row->estimated ? row->error.relmse : 0;
         more = row->cpu_seconds < 0.5 * j->seconds && c->relmse[c->count] > r->relmse && c->count + 1 < MAX_ROWS;
         c->count++;
+        c->body = report.body;
         free(c->picture);
         c->picture = pixels_of(&film);
         c->mean = luminance_mean(&film);
@@ -394,10 +398,45 @@ static const char *const STYLE =
     "h2{margin-top:3rem;border-top:1px solid #ccc;padding-top:1rem}"
     "img{max-width:100%;height:auto}table{border-collapse:collapse;font-size:14px}"
     "td,th{padding:.2rem .6rem;text-align:right;border-bottom:1px solid #ddd}td:first-child,th:first-child{text-align:left}"
-    ".scroll{overflow-x:auto}.tiles{display:grid;grid-template-columns:repeat(auto-fill,minmax(9rem,1fr));gap:.8rem}"
+    ".scroll,.plot{overflow-x:auto}.plot img{min-width:34rem}code{overflow-wrap:anywhere}.tiles{display:grid;grid-template-columns:repeat(auto-fill,minmax(9rem,1fr));gap:.8rem}"
     ".tiles figure{margin:0}.tiles img{width:100%;image-rendering:pixelated}figcaption{font-size:13px;line-height:1.3}"
     "nav a{margin-right:.8rem;white-space:nowrap}"
     "@media print{body{max-width:none;margin:0;font-size:11px}h2{break-before:page}.tiles{grid-template-columns:repeat(5,1fr)}}";
+
+/* Text that may hold what HTML reads as its own. */
+static void write_escaped(FILE *f, const char *text)
+{
+    for (; *text; text++)
+        if (*text == '<') fputs("&lt;", f);
+        else if (*text == '&') fputs("&amp;", f);
+        else fputc(*text, f);
+}
+
+/* What follows `key` and blanks in a file of lines, where there is such a file; else "". */
+static const char *line_of(const char *path, const char *key, char *buffer, int size)
+{
+    FILE *const f = fopen(path, "r");
+    const char *found = "";
+    while (f && !*found && fgets(buffer, size, f))
+        if (strncmp(buffer, key, strlen(key)) == 0) {
+            buffer[strcspn(buffer, "\n")] = 0;
+            found = buffer + strlen(key);
+            found += strspn(found, " \t:");
+        }
+    if (f) fclose(f);
+    return found;
+}
+
+static void write_machine(const job *j)
+{
+    char buffer[256];
+    const char *const machine = line_of("/proc/cpuinfo", "model name", buffer, sizeof buffer);
+    fprintf(j->html, "<p>Machine: ");
+    write_escaped(j->html, *machine ? machine : "one that does not say its name");
+    fprintf(j->html, ", one thread. Compiler: %s. Flags: <code>", COMPILER);
+    write_escaped(j->html, j->flags ? j->flags : "not told");
+    fprintf(j->html, "</code>.</p>\n<nav>");
+}
 
 static void begin_page(const job *j)
 {
@@ -409,14 +448,14 @@ static void begin_page(const job *j)
             "<h1>Error against run time</h1>\n",
             STYLE);
     fprintf(j->html,
-            "<p>pathtracer.h %s, %s, one thread, %d x %d pixels; compiled by %s. Each row of a curve is a render of its own, "
+            "<p>pathtracer.h %s, %s, %d x %d pixels. Each row of a curve is a render of its own, "
             "with its own random numbers; errors are true ones, against a converged reference whose own error is "
             "subtracted. relMSE is the mean of (I - R)<sup>2</sup> / (R<sup>2</sup> + (0.1 mean luminance of "
             "R)<sup>2</sup>); the estimate of a render, which has no reference, takes I for R, and so sees bright speckles "
             "as less wrong than they are; efficiency is 1 / (relMSE &times; CPU seconds) of the last row. Ratios hold on one machine in "
-            "one run; absolute seconds do not.</p>\n<nav>",
-            PT_VERSION_STRING, sizeof(pt_real) == 4 ? "float" : "double", j->size, j->size,
-            COMPILER);
+            "one run; absolute seconds do not.</p>\n",
+            PT_VERSION_STRING, sizeof(pt_real) == 4 ? "float" : "double", j->size, j->size);
+    write_machine(j);
     for (i = 0; i < count; i++)
         if (!j->only_scene || strcmp(j->only_scene, scenes[i].name) == 0)
             fprintf(j->html, "<a href=\"#%s\">%s</a>", scenes[i].name, scenes[i].name);
@@ -439,15 +478,15 @@ static void write_table(const job *j, const curve *curves, int count, const refe
 {
     const double plain = plain_efficiency(curves, count);
     int k;
-    fprintf(j->html, "<div class=\"scroll\"><table><tr><th>method, sampler</th><th>spp</th><th>CPU s</th><th>relative "
+    fprintf(j->html, "<div class=\"scroll\"><table><tr><th>method, sampler</th><th>body</th><th>spp</th><th>CPU s</th><th>relative "
                      "error</th><th>estimated</th><th>efficiency</th><th>over plain</th><th>order</th><th>mean - "
                      "reference</th></tr>\n");
     for (k = 0; k < count; k++) {
         const curve *const c = &curves[k];
         const int last = c->count - 1;
         if (last < 0) continue;
-        fprintf(j->html, "<tr><td>%s</td><td>%lu</td><td>%.3f</td><td>%.4f</td>", c->label, (unsigned long)c->spp[last],
-                c->seconds[last], sqrt(fmax(0, c->relmse[last])));
+        fprintf(j->html, "<tr><td>%s</td><td>%s</td><td>%lu</td><td>%.3f</td><td>%.4f</td>", c->label, c->body,
+                (unsigned long)c->spp[last], c->seconds[last], sqrt(fmax(0, c->relmse[last])));
         if (c->estimated[last] > 0) fprintf(j->html, "<td>%.4f</td>", sqrt(c->estimated[last]));
         else fprintf(j->html, "<td></td>");
         fprintf(j->html, "<td>%.3g</td>", c->efficiency);
@@ -507,11 +546,11 @@ static void write_price(const job *j, const curve *curves, int count)
 
 /* ---- cost against size --------------------------------------------------------------------------------------- */
 
-enum { RAYS = 200000 };
+enum { RAYS = 200000, SIZES = 6, TREES = 2, DEPTHS = 7 };
 
+/* What the tree costs that pt_commit makes. */
 typedef struct growth {
-    double count[MAX_ROWS], build[MAX_ROWS], ray[MAX_ROWS], shadow[MAX_ROWS]; /* seconds; nanoseconds a ray */
-    int rows;
+    double build[SIZES], ray[SIZES], shadow[SIZES]; /* CPU seconds; nanoseconds a ray                      */
 } growth;
 
 /* A bumpy torus of 2 u v triangles, u = 4 v. */
@@ -539,51 +578,77 @@ static int add_torus(pt_scene *scene, uint32_t u, uint32_t v)
     return ok;
 }
 
-/* Rays between random points of a ball about the torus. */
-static double nanoseconds(const pt_scene *scene, int any)
+/* Rays between random points of a sphere about the torus. */
+static pt_ray *make_rays(void)
 {
+    pt_ray *const ray = (pt_ray *)malloc(RAYS * sizeof *ray);
     pt_pcg32 rng = pt_pcg32_make(77, 7);
-    double start;
-    int i, hits = 0;
-    start = pt_cpu_seconds();
-    for (i = 0; i < RAYS; i++) {
-        pt_ray ray;
-        pt_hit hit;
-        const double u[4] = {pt_pcg32_double(&rng), pt_pcg32_double(&rng), pt_pcg32_double(&rng), pt_pcg32_double(&rng)};
-        const pt_vec3 from = pt_v3_scale(pt_warp_sphere(pt_v2((pt_real)u[0], (pt_real)u[1])), 2);
-        ray.o = from;
-        ray.d = pt_v3_normalize(pt_v3_sub(pt_warp_sphere(pt_v2((pt_real)u[2], (pt_real)u[3])), from));
-        ray.tmax = (pt_real)1e30;
-        hits += any ? pt_occluded(scene, &ray) : pt_intersect(scene, &ray, &hit);
+    int i, k;
+    for (i = 0; ray && i < RAYS; i++) {
+        pt_real u[4];
+        for (k = 0; k < 4; k++) u[k] = (pt_real)pt_pcg32_double(&rng);
+        ray[i].o = pt_v3_scale(pt_warp_sphere(pt_v2(u[0], u[1])), 2);
+        ray[i].d = pt_v3_normalize(pt_v3_sub(pt_v3_scale(pt_warp_sphere(pt_v2(u[2], u[3])), 2), ray[i].o));
+        ray[i].tmax = (pt_real)1e30;
     }
-    return hits ? 1e9 * (pt_cpu_seconds() - start) / RAYS : 0;
+    return ray;
 }
 
-static void grow_meshes(job *j, growth *g, int sizes)
+/* A ray's cost, repeated for a fifth of a second; any: any hit is asked for, not the nearest. */
+static double nanoseconds(const pt_scene *scene, const pt_ray *ray, int any)
 {
-    uint32_t v = 4;
-    int k;
-    for (k = 0; k < sizes; k++, v = (uint32_t)(v * 3.1623 + 0.5)) {
-        pt_scene scene = PT_SCENE_INIT;
-        const double start = pt_cpu_seconds();
-        double build;
-        if (!add_torus(&scene, 4 * v, v)) {
-            j->failed++;
-        } else {
-            build = pt_cpu_seconds();
-            if (pt_commit(&scene) == PT_OK) {
-                g->count[g->rows] = 8.0 * v * v;
-                g->build[g->rows] = pt_cpu_seconds() - build;
-                g->ray[g->rows] = nanoseconds(&scene, 0);
-                g->shadow[g->rows] = nanoseconds(&scene, 1);
-                fprintf(j->csv, "mesh,triangles,%.0f,,,%.6g,%.6g,%.6g,,\n", g->count[g->rows], g->build[g->rows],
-                        g->ray[g->rows], g->shadow[g->rows]);
-                g->rows++;
-            }
-            fprintf(stderr, "mesh of %.0f triangles: %.2f s\n", 8.0 * v * v, pt_cpu_seconds() - start);
-        }
-        pt_scene_free(&scene);
+    const double start = pt_cpu_seconds();
+    double seconds, traced = 0;
+    volatile int hits = 0;
+    pt_hit hit;
+    int i;
+    do {
+        for (i = 0; i < RAYS; i++) hits = hits + (any ? pt_occluded(scene, &ray[i]) : pt_intersect(scene, &ray[i], &hit));
+        traced += RAYS;
+        seconds = pt_cpu_seconds() - start;
+    } while (seconds < 0.2);
+    return 1e9 * seconds / traced;
+}
+
+/* One mesh with one tree; 0 if there was no memory for it. */
+static int grow_mesh(job *j, uint32_t v, pt_tree tree, const pt_ray *ray, growth *g, int k)
+{
+    const char *const name = tree == PT_TREE_BINARY ? "binary" : "wide";
+    const double count = 8.0 * v * v;
+    pt_scene scene = PT_SCENE_INIT;
+    double start;
+    int ok;
+    scene.tree = tree;
+    scene.threads = 1;
+    ok = add_torus(&scene, 4 * v, v);
+    start = pt_cpu_seconds();
+    ok = ok && pt_commit(&scene) == PT_OK;
+    if (ok) {
+        g->build[k] = pt_cpu_seconds() - start;
+        g->ray[k] = nanoseconds(&scene, ray, 0);
+        g->shadow[k] = nanoseconds(&scene, ray, 1);
+        fprintf(j->cost, "build,%.0f,%s,%.6g,CPU s\n", count, name, g->build[k]);
+        fprintf(j->cost, "nearest hit,%.0f,%s,%.6g,ns\n", count, name, g->ray[k]);
+        fprintf(j->cost, "any hit,%.0f,%s,%.6g,ns\n", count, name, g->shadow[k]);
+        fprintf(stderr, "%8.0f triangles, %-6s tree: built in %.3f s, %.0f ns a nearest hit\n", count, name, g->build[k], g->ray[k]);
     }
+    pt_scene_free(&scene);
+    return ok;
+}
+
+/* 10^2 to 10^7 triangles, as close as 8 v^2 comes. */
+static void grow_meshes(job *j, double *count, growth *g)
+{
+    pt_ray *const ray = make_rays();
+    int k;
+    for (k = 0; ray && k < SIZES; k++) {
+        const uint32_t v = (uint32_t)(sqrt(pow(10, k + 2) / 8) + 0.5);
+        count[k] = 8.0 * v * v;
+        j->failed += !grow_mesh(j, v, PT_TREE_DEFAULT, ray, &g[0], k);
+        j->failed += !grow_mesh(j, v, PT_TREE_BINARY, ray, &g[1], k);
+    }
+    j->failed += !ray;
+    free(ray);
 }
 
 static int plot_pairs(const char *path, const double *x, const double *const *y, const char *const *labels, int lines, int rows,
@@ -602,54 +667,84 @@ static int plot_pairs(const char *path, const double *x, const double *const *y,
     return fclose(p.file) == 0;
 }
 
-/* CPU seconds of one sample per pixel of the Cornell box, if paths end after 1, 2, 4, ... edges. */
+/* Nanoseconds a path of the Cornell box, if paths end after so many edges. */
+static double cost_of_edges(job *j, const pt_scene *scene, const pt_camera *camera, int edges, int one_at_a_time)
+{
+    pt_render_desc desc = desc_of(j, camera, "path", 5);
+    pt_film film = PT_FILM_INIT;
+    pt_report report = PT_REPORT_INIT;
+    double cost = 0;
+    desc.spp = 16;
+    desc.li.max_edges = edges;
+    desc.li.roulette = PT_ROULETTE_NONE;
+    desc.no_lockstep = one_at_a_time;
+    if (pt_render(scene, &desc, &film, &report) == PT_OK) cost = 1e9 * report.cpu_seconds / (16.0 * j->size * j->size);
+    if (cost > 0) fprintf(j->cost, "path of so many edges,%d,%s,%.6g,ns\n", edges, report.body, cost);
+    else j->failed++;
+    pt_report_free(&report);
+    pt_film_free(&film);
+    return cost;
+}
+
 static void cost_of_depth(job *j)
 {
-    double edges[7], cost[7];
-    const double *const lines[1] = {cost};
-    const char *const labels[1] = {"cornell, no roulette"};
+    double edges[DEPTHS], cost[2][DEPTHS];
+    const double *const lines[2] = {cost[0], cost[1]};
+    const char *const labels[2] = {"as it is rendered", "one path at a time"};
     pt_scene scene = PT_SCENE_INIT;
     pt_camera camera;
     char path[512];
-    int k;
+    int k, i;
     if (pt_scene_find("cornell")->make(&scene, &camera) == PT_OK) {
-        for (k = 0; k < 7; k++) {
-            pt_render_desc desc = desc_of(j, &camera, "path", 5);
-            pt_film film = PT_FILM_INIT;
-            const double start = pt_cpu_seconds();
-            desc.spp = 4;
-            desc.li.max_edges = 1 << k;
-            desc.li.roulette = PT_ROULETTE_NONE;
-            j->failed += pt_render(&scene, &desc, &film, NULL) != PT_OK;
+        for (k = 0; k < DEPTHS; k++) {
             edges[k] = 1 << k;
-            cost[k] = 1e9 * (pt_cpu_seconds() - start) / (4.0 * j->size * j->size);
-            fprintf(j->csv, "depth,edges,%.0f,,,%.6g,,,,\n", edges[k], cost[k]);
-            pt_film_free(&film);
+            for (i = 0; i < 2; i++) cost[i][k] = cost_of_edges(j, &scene, &camera, 1 << k, i);
         }
-        j->failed += !plot_pairs(text_of(path, sizeof path, "%s/cost-depth.svg", j->directory), edges, lines, labels, 1, 7,
+        j->failed += !plot_pairs(text_of(path, sizeof path, "%s/cost-depth.svg", j->directory), edges, lines, labels, 2, DEPTHS,
                                  "longest path, edges", "nanoseconds a path");
     }
     pt_scene_free(&scene);
 }
 
-static void cost_of_size(job *j, int sizes)
+static void write_cost(const job *j, double seconds)
 {
-    static growth g;
-    const double *const rays[2] = {g.ray, g.shadow}, *const builds[1] = {g.build};
-    const char *const ray_labels[2] = {"nearest hit", "occlusion"}, *const build_labels[1] = {"pt_commit"};
+    char buffer[256];
+    const char *const memory = line_of("/proc/self/status", "VmHWM", buffer, sizeof buffer);
+    fprintf(j->html, "<h2 id=\"cost\">Cost against size</h2>\n<p>A bumpy torus of 10<sup>2</sup> to 10<sup>7</sup> triangles, "
+                     "%d rays between random points of a sphere about it, by the wide tree, which is the default, and by the "
+                     "binary one, which finds the same hits; and the Cornell box with longer and longer paths, without "
+                     "roulette. One thread; all of this took %.0f CPU seconds",
+            RAYS, seconds);
+    if (*memory) fprintf(j->html, " and at most %.1f GiB of memory", strtod(memory, NULL) / 1048576);
+    fprintf(j->html, ".</p>\n<h3>Rays</h3>\n<div class=\"plot\"><img src=\"cost-rays.svg\" alt=\"nanoseconds a ray against "
+                     "triangles\"></div>\n<h3>Building</h3>\n<div class=\"plot\"><img src=\"cost-build.svg\" alt=\"seconds to "
+                     "build against triangles\"></div>\n<h3>Depth</h3>\n<div class=\"plot\"><img src=\"cost-depth.svg\" "
+                     "alt=\"nanoseconds a path against its longest length\"></div>\n");
+}
+
+static void cost_of_size(job *j)
+{
+    static double count[SIZES];
+    static growth g[TREES];
+    const double *const rays[4] = {g[0].ray, g[0].shadow, g[1].ray, g[1].shadow}, *const builds[2] = {g[0].build, g[1].build};
+    const char *const ray_labels[4] = {"nearest hit, wide tree", "any hit, wide tree", "nearest hit, binary", "any hit, binary"};
+    const char *const build_labels[2] = {"wide tree", "binary tree"};
+    const double start = pt_cpu_seconds();
     char path[512];
-    grow_meshes(j, &g, sizes);
+    j->cost = fopen(text_of(path, sizeof path, "%s/cost.csv", j->directory), "w");
+    if (!j->cost) {
+        j->failed++;
+        return;
+    }
+    fprintf(j->cost, "what,size,by,value,unit\n");
+    grow_meshes(j, count, g);
     cost_of_depth(j);
-    j->failed += !plot_pairs(text_of(path, sizeof path, "%s/cost-rays.svg", j->directory), g.count, rays, ray_labels, 2, g.rows,
+    j->failed += fclose(j->cost) != 0;
+    j->failed += !plot_pairs(text_of(path, sizeof path, "%s/cost-rays.svg", j->directory), count, rays, ray_labels, 4, SIZES,
                              "triangles", "nanoseconds a ray");
-    j->failed += !plot_pairs(text_of(path, sizeof path, "%s/cost-build.svg", j->directory), g.count, builds, build_labels, 1,
-                             g.rows, "triangles", "CPU seconds to build");
-    fprintf(j->html, "<h2 id=\"cost\">Cost against size</h2>\n<p>A bumpy torus of more and more triangles, %d rays between "
-                     "random points about it; and the Cornell box with longer and longer paths. One thread.</p>\n"
-                     "<img src=\"cost-rays.svg\" alt=\"nanoseconds a ray against triangles\">"
-                     "<img src=\"cost-build.svg\" alt=\"seconds to build against triangles\">"
-                     "<img src=\"cost-depth.svg\" alt=\"nanoseconds a path against its longest length\">\n",
-            RAYS);
+    j->failed += !plot_pairs(text_of(path, sizeof path, "%s/cost-build.svg", j->directory), count, builds, build_labels, 2, SIZES,
+                             "triangles", "CPU seconds to build");
+    write_cost(j, pt_cpu_seconds() - start);
 }
 
 /* ---- all --------------------------------------------------------------------------------------------------- */
@@ -684,7 +779,7 @@ static void one_scene(job *j, const pt_scene_entry *entry)
                 (unsigned long)pt_film_spp(&r.film), sqrt(r.relmse), text);
         text_of(text, sizeof text, "%s/%s.svg", j->directory, entry->name);
         j->failed += !plot_curves(text, curves, count);
-        fprintf(j->html, "<img src=\"%s.svg\" alt=\"error against CPU seconds, log-log\">\n", entry->name);
+        fprintf(j->html, "<div class=\"plot\"><img src=\"%s.svg\" alt=\"error against CPU seconds, log-log\"></div>\n", entry->name);
         write_table(j, curves, count, &r);
         write_price(j, curves, count);
         write_tiles(j, entry->name, curves, count, &r);
@@ -706,6 +801,7 @@ static int parse(job *j, int argc, char **argv)
         if (strcmp(argv[i], "--seconds") == 0) total = strtod(argv[i + 1], NULL);
         else if (strcmp(argv[i], "--scene") == 0) j->only_scene = argv[i + 1];
         else if (strcmp(argv[i], "--method") == 0) j->only_method = argv[i + 1];
+        else if (strcmp(argv[i], "--flags") == 0) j->flags = argv[i + 1];
         else if (strcmp(argv[i], "--size") == 0) j->size = (int)strtol(argv[i + 1], NULL, 10);
         else return 0;
     }
@@ -724,7 +820,7 @@ int main(int argc, char **argv)
     int count, i;
     const pt_scene_entry *const scenes = pt_scenes(&count);
     if (!parse(&j, argc, argv)) {
-        fprintf(stderr, "usage: report DIRECTORY [--seconds S] [--scene NAME] [--method NAME] [--size N]\n");
+        fprintf(stderr, "usage: report DIRECTORY [--seconds S] [--scene NAME] [--method NAME] [--size N] [--flags TEXT]\n");
         return 2;
     }
     j.html = fopen(text_of(path, sizeof path, "%s/index.html", j.directory), "w");
@@ -736,7 +832,7 @@ int main(int argc, char **argv)
     begin_page(&j);
     for (i = 0; i < count; i++)
         if (!j.only_scene || strcmp(j.only_scene, scenes[i].name) == 0) one_scene(&j, &scenes[i]);
-    if (!j.only_scene) cost_of_size(&j, j.seconds < 1 ? 5 : 6); /* the sixth has ten million triangles */
+    if (!j.only_scene) cost_of_size(&j);
     fprintf(j.html, "</body></html>\n");
     j.failed += fclose(j.html) != 0;
     j.failed += fclose(j.csv) != 0;
