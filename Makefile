@@ -221,7 +221,7 @@ REPORT_SCENE = $(if $(filter command line environment,$(origin SCENE)),--scene $
 report: build/report/program
 	@mkdir -p build/report/references
 	build/report/program build/report --seconds $(if $(filter command line environment,$(origin SECONDS)),$(SECONDS),60) $(REPORT_SCENE) $(if $(METHOD),--method $(METHOD)) \
-	    --flags '$(FIXED) $(CFLAGS) $(EXTRA)'
+	    --flags '$(strip $(FIXED) $(CFLAGS) $(EXTRA))'
 
 build/report/program: tests/bench/report.c pathtracer.h build/flags
 	@mkdir -p build/report

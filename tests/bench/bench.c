@@ -672,7 +672,8 @@ static void mark_line(function_list *list, char *line)
     if (found) found->ran = 1;
 }
 
-/* Instructions by callgrind, within pt_render alone; `list` tells which functions ran in it. < 0: no callgrind. */
+/* Instructions by callgrind, within the tasks of a render alone: camera, paths, film, without what is made once. `list`
+   tells which functions ran in them. < 0: no callgrind. */
 static double count_by_callgrind(const char *program, const char *scene, int body, function_list *list)
 {
     char command[512], line[1024];
@@ -680,8 +681,8 @@ static double count_by_callgrind(const char *program, const char *scene, int bod
     FILE *f;
 
     snprintf(command, sizeof command,
-             "valgrind --tool=callgrind --toggle-collect=pt_render --callgrind-out-file=" CALLS " %s --render %s %d > /dev/null 2>&1",
-             program, scene, body);
+             "valgrind --tool=callgrind --toggle-collect=pti_render_tile --callgrind-out-file=" CALLS
+             " %s --render %s %d > /dev/null 2>&1", program, scene, body);
     remove(CALLS);
     if (system(command) != 0) return -1;
     f = fopen(CALLS, "r");
