@@ -9570,7 +9570,8 @@ enum {
     PTI_OF_N, PTI_OF_D = 3,         /* flat: the plane n.p + d = 0 */
     PTI_OF_CENTRE = 4, PTI_OF_DEPTH = 7, /* centroid and its distance to the nearest edge; centre of a sphere */
     PTI_OF_RADIUS = 8,              /* 0: flat */
-    PTI_OF_ALBEDO = 9, PTI_OF_KIND = 12, PTI_OF_IOR = 13, PTI_OF_LIGHT = 14, PTI_OF_COUNT = 15
+    PTI_OF_ALBEDO = 9, PTI_OF_KIND = 12, PTI_OF_IOR = 13, PTI_OF_LIGHT = 14,
+    PTI_OF_ALPHA = 15, PTI_OF_ETA = 16, PTI_OF_K = 19, PTI_OF_COUNT = 22 /* of metal; alpha 0: smooth       */
 };
 enum {
     PTI_LIT_P, PTI_LIT_E1 = 3, PTI_LIT_E2 = 6, PTI_LIT_N = 9, /* corner, edges, normal; centre of a sphere   */
@@ -9586,8 +9587,11 @@ typedef struct pti_lockstep {
                                        x, y, z, 1 of the height above the plane and of the distances from edges: two, and
                                        the distances of the opposite edges, or three. Sphere: centre, radius        */
     float of[PTI_OF_COUNT][PTI_LOCK_MAX], light[PTI_LIT_COUNT][PTI_LOCK_MAX], chosen[PTI_LOCK_MAX];
-    int light_count, sphere_lights, specular; /* specular: some material is                                 */
+    int light_count, sphere_lights, specular, metal, rough; /* specular: something is not diffuse; some metal; some rough one */
+    int shading;                    /* some shading normals                                                */
     float e, e_camera;              /* how far a computed point may be off its plane; the same for rays of the camera */
+    const pt_scene *tree;           /* of more than that; then `of` has a column for each material, e is of lamps, and
+                                       rays are asked one after the other                                        */
 } pti_lockstep;
 
 /* A primitive while the scene is being made ready: 0 (sphere), 3 or 4 corners. */
@@ -9607,22 +9611,28 @@ static int pti_lock_axis(const pti_lock_item *q)
     return none[0] ? 0 : none[1] ? 1 : none[2] ? 2 : -1;
 }
 
+static void pti_lock_single(const pt_scene *scene, const pt_primitive *p, pti_lock_item *q)
+{
+    memset(q, 0, sizeof *q);
+    q->material = pti_primitive_material(scene, p);
+    q->light = p->light;
+    q->twin = -1;
+    q->kind = PTI_LOCK_SPHERES;
+    if (p->shape != PT_SHAPE_SPHERE) {
+        q->corners = pti_corners(scene, p, q->c);
+        return;
+    }
+    q->c[0] = scene->spheres[p->index].centre;
+    q->radius = (double)scene->spheres[p->index].radius;
+}
+
 /* Item from primitive i (and perhaps i + 1, which then is its other half); how many it takes. */
 static uint32_t pti_lock_collect(const pt_scene *scene, uint32_t i, double extent, pti_lock_item *q)
 {
     const pt_primitive *p = &scene->primitives[i];
     pt_vec3 other[4], all[4];
-    memset(q, 0, sizeof *q);
-    q->material = pti_primitive_material(scene, p);
-    q->light = p->light;
-    q->twin = -1;
-    if (p->shape == PT_SHAPE_SPHERE) {
-        q->c[0] = scene->spheres[p->index].centre;
-        q->radius = (double)scene->spheres[p->index].radius;
-        q->kind = PTI_LOCK_SPHERES;
-        return 1;
-    }
-    q->corners = pti_corners(scene, p, q->c);
+    pti_lock_single(scene, p, q);
+    if (q->corners == 0) return 1;
     if (q->corners == 3 && i + 1 < scene->primitive_count && p[1].shape == PT_SHAPE_TRIANGLE && pti_corners(scene, &p[1], other) == 3 &&
         pti_primitive_material(scene, &p[1]) == q->material && pti_is_parallelogram(q->c, other, extent, all)) {
         memcpy(q->c, all, sizeof all);
@@ -9758,10 +9768,23 @@ static void pti_lock_write_light(pti_lockstep *k, const pt_scene *scene, const p
     k->sphere_lights += q->corners == 0;
 }
 
-/* Writes item q as number i; returns its smallest measure. */
+static void pti_lock_write_material(pti_lockstep *k, const pt_material *m, int i)
+{
+    pti_lock_put(k->of, PTI_OF_ALBEDO, i, pti_d((double)m->albedo.r, (double)m->albedo.g, (double)m->albedo.b));
+    k->of[PTI_OF_KIND][i] = (float)m->kind;
+    k->of[PTI_OF_IOR][i] = (float)pti_ior(m);
+    k->specular |= m->kind != PT_MATERIAL_DIFFUSE;
+    if (m->kind != PT_MATERIAL_CONDUCTOR) return;
+    k->of[PTI_OF_ALPHA][i] = pti_is_smooth(m) ? 0 : (float)m->roughness * (float)m->roughness;
+    pti_lock_put(k->of, PTI_OF_ETA, i, pti_d((double)m->eta.r, (double)m->eta.g, (double)m->eta.b));
+    pti_lock_put(k->of, PTI_OF_K, i, pti_d((double)m->k.r, (double)m->k.g, (double)m->k.b));
+    k->metal = 1;
+    k->rough |= !pti_is_smooth(m);
+}
+
+/* Writes item q as number i; returns its smallest measure: from the middle to an edge, across a ball. */
 static double pti_lock_write(pti_lockstep *k, const pt_scene *scene, const pti_lock_item *q, int i, double *sum)
 {
-    const pt_material *m = &scene->materials[q->material];
     pti_d3 n = pti_d(0, 0, 0);
     double depth = q->radius;
     if (q->corners) {
@@ -9778,16 +9801,66 @@ static double pti_lock_write(pti_lockstep *k, const pt_scene *scene, const pti_l
     pti_lock_put(k->of, PTI_OF_CENTRE, i, pti_lock_middle(q));
     k->of[PTI_OF_DEPTH][i] = (float)depth;
     k->of[PTI_OF_RADIUS][i] = (float)q->radius;
-    pti_lock_put(k->of, PTI_OF_ALBEDO, i, pti_d((double)m->albedo.r, (double)m->albedo.g, (double)m->albedo.b));
-    k->of[PTI_OF_KIND][i] = (float)m->kind;
-    k->of[PTI_OF_IOR][i] = (float)pti_ior(m);
+    pti_lock_write_material(k, &scene->materials[q->material], i);
     k->of[PTI_OF_LIGHT][i] = -1;
-    k->specular |= m->kind != PT_MATERIAL_DIFFUSE;
     if (q->light >= 0) {
         k->of[PTI_OF_LIGHT][i] = (float)k->light_count;
         pti_lock_write_light(k, scene, q, n, sum);
     }
-    return depth;
+    return q->corners ? depth : 2 * depth;
+}
+
+/* Rough metal: the density of GGX facets at a half vector that is off by 3 u is off by 6 u / alpha of itself at most, where
+   u = 2^-24: 7e-4 from the alpha on that is taken. The squares of eta and k have room in a float. */
+static int pti_lock_takes(const pt_material *m)
+{
+    const double most = fmax(pti_max3((double)m->eta.r, (double)m->eta.g, (double)m->eta.b), pti_max3((double)m->k.r, (double)m->k.g, (double)m->k.b));
+    if (m->kind == PT_MATERIAL_DIELECTRIC) return pti_is_smooth(m);
+    return m->kind != PT_MATERIAL_CONDUCTOR || (most < 1e6 && (pti_is_smooth(m) || (double)m->roughness * (double)m->roughness >= 1 / 2048.));
+}
+
+/* Does a scene need nothing else, but perhaps `more`? */
+static int pti_lock_knows(const pt_scene *scene, unsigned more)
+{
+    const unsigned known = more | PT_NEEDS_TRIANGLES | PT_NEEDS_PARALLELOGRAMS | PT_NEEDS_SPHERES | PT_NEEDS_DIFFUSE | PT_NEEDS_MIRROR |
+                           PT_NEEDS_DIELECTRIC | PT_NEEDS_CONDUCTOR | PT_NEEDS_ROUGHNESS | PT_NEEDS_UVS | PT_NEEDS_AREA_LIGHTS | PT_NEEDS_BVH;
+    return (scene->needs & ~known) == 0 && scene->primitive_count > 0;
+}
+
+static int pti_lock_bright(const pti_lockstep *k)
+{
+    int j;
+    for (j = 0; j < k->light_count; j++)
+        if (!(k->light[PTI_LIT_DENSITY][j] > 0)) return 0; /* too dim for 24 bits */
+    return 1;
+}
+
+/* Makes a scene of any size ready, whose rays are asked of its tree. Lamps are few, and as large beside e as what a small scene is
+   made of: their points are in float. */
+static int pti_lockstep_make_tree(pti_lockstep *k, const pt_scene *scene)
+{
+    double smallest = HUGE_VAL, sum = 0, x = 0;
+    uint32_t i, j;
+    if (!pti_lock_knows(scene, PT_NEEDS_SHADING_NORMALS) || scene->material_count > PTI_LOCK_MAX || scene->light_count > PTI_LOCK_MAX) return 0;
+    memset(k, 0, sizeof *k);
+    k->tree = scene;
+    k->shading = (scene->needs & PT_NEEDS_SHADING_NORMALS) != 0;
+    for (i = 0; i < scene->material_count; i++) {
+        if (!pti_lock_takes(&scene->materials[i])) return 0;
+        pti_lock_write_material(k, &scene->materials[i], (int)i);
+    }
+    for (i = 0; i < scene->light_count; i++) {
+        pti_lock_item q;
+        float unused[16];
+        pti_lock_single(scene, &scene->primitives[scene->lights[i].primitive], &q);
+        for (j = 0; j < (q.corners ? (uint32_t)q.corners : 1); j++)
+            x = fmax(x, q.radius + pti_max3(fabs((double)q.c[j].x), fabs((double)q.c[j].y), fabs((double)q.c[j].z)));
+        q.kind = PTI_LOCK_TRIANGLES;
+        smallest = fmin(smallest, q.corners ? pti_lock_write_flat(&q, unused) : 2 * q.radius);
+        pti_lock_write_light(k, scene, &q, q.corners ? pti_lock_normal(&q) : pti_d(0, 0, 0), &sum);
+    }
+    k->e = (float)(17 * PTI_2_M24 * x);
+    return pti_lock_bright(k) && smallest > 2048 * (double)k->e && x < 1e15;
 }
 
 /* Makes a scene ready; 0: it is not one for lanes, or not seen from such a place. With u = 2^-24 and all coordinates at
@@ -9796,8 +9869,6 @@ static double pti_lock_write(pti_lockstep *k, const pt_scene *scene, const pti_l
    and d (4.4 u x): all together below 17 u x = e. */
 static int pti_lockstep_make(pti_lockstep *k, const pt_scene *scene, pt_vec3 eye)
 {
-    const unsigned taken = PT_NEEDS_TRIANGLES | PT_NEEDS_PARALLELOGRAMS | PT_NEEDS_SPHERES | PT_NEEDS_DIFFUSE | PT_NEEDS_MIRROR |
-                           PT_NEEDS_DIELECTRIC | PT_NEEDS_UVS | PT_NEEDS_AREA_LIGHTS | PT_NEEDS_BVH;
     const double x = fmax(pti_max3((double)scene->lo.x, (double)scene->lo.y, (double)scene->lo.z),
                           pti_max3((double)scene->hi.x, (double)scene->hi.y, (double)scene->hi.z));
     const double from = fmax(x, pti_max3((double)eye.x, (double)eye.y, (double)eye.z));
@@ -9805,12 +9876,13 @@ static int pti_lockstep_make(pti_lockstep *k, const pt_scene *scene, pt_vec3 eye
     double smallest = HUGE_VAL, sum = 0;
     uint32_t i;
     int count = 0, n = 0, kind, j, blocks;
-    if ((scene->needs & ~taken) || scene->primitive_count < 1 || scene->primitive_count > PTI_LOCK_MAX) return 0;
+    if (!pti_lock_knows(scene, 0) || scene->primitive_count > PTI_LOCK_MAX) return 0;
     memset(k, 0, sizeof *k);
     k->e = (float)(17 * PTI_2_M24 * x);
     k->e_camera = (float)(17 * PTI_2_M24 * from);
     for (i = 0; i < scene->primitive_count; count++) i += pti_lock_collect(scene, i, x, &items[count]);
     for (j = 0; j < count; j++) {
+        if (!pti_lock_takes(&scene->materials[items[j].material])) return 0;
         items[j].blocks = pti_lock_blocks(&items[j], items, count, (double)k->e);
         for (kind = 0; kind < j; kind++)
             if (pti_lock_wedge(&items[j], &items[kind], 4 * (double)k->e)) return 0;
@@ -9824,9 +9896,7 @@ static int pti_lockstep_make(pti_lockstep *k, const pt_scene *scene, pt_vec3 eye
         }
     }
     k->begin[PTI_LOCK_CLASSES] = n;
-    for (j = 0; j < k->light_count; j++)
-        if (!(k->light[PTI_LIT_DENSITY][j] > 0)) return 0; /* too dim for 24 bits */
-    return smallest > 2048 * (double)k->e && smallest > 64 * (double)k->e_camera && (double)k->e > 1e-30 && x < 1e15;
+    return pti_lock_bright(k) && smallest > 2048 * (double)k->e && smallest > 64 * (double)k->e_camera && (double)k->e > 1e-30 && x < 1e15;
 }
 
 /* --- rays --- */
@@ -10010,7 +10080,7 @@ static pti_uw pti_lock_sobol(pti_uw n, int d)
 /* The state of a path, a row of lanes each. Density < 0: the last direction came from a delta lobe, or the camera. */
 enum {
     PTI_ROW_O, PTI_ROW_D = 3, PTI_ROW_BETA = 6, PTI_ROW_SUM = 9, PTI_ROW_DENSITY = 12, PTI_ROW_ETA2, PTI_ROW_A, PTI_ROW_B,
-    PTI_ROW_SLOT, PTI_ROW_EDGES, PTI_ROWS
+    PTI_ROW_SLOT, PTI_ROW_EDGES, PTI_ROW_LOW, PTI_ROWS = PTI_ROW_LOW + 3 /* low: what a float takes from the origin */
 };
 
 /* The decisions of one vertex. */
@@ -10021,10 +10091,10 @@ typedef struct pti_lock_numbers {
 /* What is hit. */
 typedef struct pti_lock_surface {
     pti_uw i;
-    pti_w3 p, n;            /* point, and normal on the side that the path came from                       */
-    pti_fw cosine;          /* of the ray and that normal                                                  */
+    pti_w3 p, n, ng;        /* point; normals, for shading and of the surface, on the side the path came from */
+    pti_fw cosine, facing;  /* of the way back and these normals                                           */
     pti_mw met, front, ball; /* anything at all; from the side of ng; a sphere                             */
-    pti_fw kind;
+    pti_fw kind, light;     /* of its material; number of its light, or -1                                */
 } pti_lock_surface;
 
 PTI_INLINE pti_w3 pti_row3(const pti_lane_row *row) { return pti_w3_make(row[0].f, row[1].f, row[2].f); }
@@ -10037,6 +10107,16 @@ PTI_INLINE void pti_row3_set(pti_lane_row *row, pti_w3 v)
 PTI_INLINE pti_w3 pti_gather3(const float (*table)[PTI_LOCK_MAX], int row, pti_uw i)
 {
     return pti_w3_make(pti_fw_gather(table[row], i), pti_fw_gather(table[row + 1], i), pti_fw_gather(table[row + 2], i));
+}
+
+/* The side of a surface, with normal n, that the path came from. */
+PTI_INLINE8 void pti_lock_face(const pti_lockstep *k, pti_lock_surface *s, pti_w3 n, pti_w3 d)
+{
+    const pti_fw along = pti_w3_dot(n, d);
+    s->front = pti_fw_lt(along, pti_fw_set(0));
+    s->cosine = s->facing = pti_fw_abs(along);
+    s->n = s->ng = pti_w3_select(s->front, n, pti_w3_scale(n, pti_fw_set(-1)));
+    s->kind = k->specular ? pti_fw_gather(k->of[PTI_OF_KIND], s->i) : pti_fw_set((float)PT_MATERIAL_DIFFUSE);
 }
 
 /* The point at t, put back on its surface and away from its edges. */
@@ -10060,11 +10140,84 @@ PTI_INLINE8 void pti_lock_land(const pti_lockstep *k, pti_w3 o, pti_w3 d, const 
         n = pti_w3_select(s->ball, out, n);
         s->p = pti_w3_select(s->ball, pti_w3_along(out, pti_fw_gather(k->of[PTI_OF_RADIUS], s->i), centre), s->p);
     }
-    s->cosine = pti_w3_dot(n, d);
-    s->front = pti_fw_lt(s->cosine, zero);
-    s->cosine = pti_fw_abs(s->cosine);
-    s->n = pti_w3_select(s->front, n, pti_w3_scale(n, pti_fw_set(-1)));
-    s->kind = k->specular ? pti_fw_gather(k->of[PTI_OF_KIND], s->i) : pti_fw_set((float)PT_MATERIAL_DIFFUSE);
+    s->light = pti_fw_gather(k->of[PTI_OF_LIGHT], s->i);
+    pti_lock_face(k, s, n, d);
+}
+
+/* The ray of a lane, with all digits of its origin. */
+static pti_ray pti_lock_ray(const pti_lane_row *row, int lane)
+{
+    double o[3];
+    int k;
+    for (k = 0; k < 3; k++) o[k] = (double)row[PTI_ROW_O + k].v[lane] + (double)row[PTI_ROW_LOW + k].v[lane];
+    return pti_ray_from(pti_d(o[0], o[1], o[2]), pti_d((double)row[PTI_ROW_D].v[lane], (double)row[PTI_ROW_D + 1].v[lane], (double)row[PTI_ROW_D + 2].v[lane]), HUGE_VAL);
+}
+
+/* pti_lock_nearest and pti_lock_land by the scene's tree. */
+static void pti_lock_meet(const pti_lockstep *k, const pti_lane_row *row, unsigned active, pt_hit *hits, pti_lock_best *best, pti_lock_surface *s)
+{
+    pti_lane_row p[3], n[3], ns[3], t, i, light;
+    unsigned balls = 0;
+    memset(p, 0, sizeof p);
+    memset(n, 0, sizeof n);
+    memset(ns, 0, sizeof ns);
+    memset(&i, 0, sizeof i);
+    t.f = pti_fw_set(PTI_LOCK_FAR);
+    light.f = pti_fw_set(-1);
+    for (; active; active &= active - 1) {
+        const int lane = pti_lowest_bit(active);
+        const pti_ray r = pti_lock_ray(row, lane);
+        pt_hit *hit = &hits[lane];
+        if (!pti_intersect(k->tree, &r, hit)) continue;
+        t.v[lane] = hit->t;
+        i.bits[lane] = (uint32_t)hit->material;
+        light.v[lane] = (float)hit->light;
+        balls |= (unsigned)(hit->shape == PT_SHAPE_SPHERE) << lane;
+        p[0].v[lane] = hit->p.x, p[1].v[lane] = hit->p.y, p[2].v[lane] = hit->p.z;
+        n[0].v[lane] = hit->ng.x, n[1].v[lane] = hit->ng.y, n[2].v[lane] = hit->ng.z;
+        ns[0].v[lane] = hit->ns.x, ns[1].v[lane] = hit->ns.y, ns[2].v[lane] = hit->ns.z;
+    }
+    best->t = t.f;
+    s->i = i.u;
+    s->p = pti_row3(p);
+    s->ball = pti_mw_of_bits(balls);
+    s->light = light.f;
+    pti_lock_face(k, s, pti_row3(n), pti_row3(row + PTI_ROW_D));
+    if (!k->shading) return;
+    s->n = pti_w3_select(s->front, pti_row3(ns), pti_w3_scale(pti_row3(ns), pti_fw_set(-1)));
+    s->cosine = pti_fw_sub(pti_fw_set(0), pti_w3_dot(s->n, pti_row3(row + PTI_ROW_D)));
+}
+
+/* Shadow rays by the tree, from hits to points of lights that are moved off: the lanes that something blocks. */
+static pti_mw pti_lock_blocked(const pti_lockstep *k, const pt_hit *hits, unsigned active, pti_w3 q, pti_w3 w)
+{
+    pti_lane_row to[3], d[3];
+    unsigned blocked = 0;
+    pti_row3_set(to, q);
+    pti_row3_set(d, w);
+    for (; active; active &= active - 1) {
+        const int lane = pti_lowest_bit(active);
+        const pti_d3 o = pti_leave(&hits[lane], pt_v3(d[0].v[lane], d[1].v[lane], d[2].v[lane]));
+        const pti_d3 end = pti_d((double)to[0].v[lane], (double)to[1].v[lane], (double)to[2].v[lane]);
+        const pti_ray r = pti_ray_from(o, pti_d_sub(end, o), 1);
+        blocked |= (unsigned)pti_occluded(k->tree, &r) << lane;
+    }
+    return pti_mw_of_bits(blocked);
+}
+
+/* The next origins of lanes. */
+static void pti_lock_depart(pti_lane_row *row, const pt_hit *hits, unsigned active)
+{
+    for (; active; active &= active - 1) {
+        const int lane = pti_lowest_bit(active);
+        const pti_d3 o = pti_leave(&hits[lane], pt_v3(row[PTI_ROW_D].v[lane], row[PTI_ROW_D + 1].v[lane], row[PTI_ROW_D + 2].v[lane]));
+        const double all[3] = {o.x, o.y, o.z};
+        int k;
+        for (k = 0; k < 3; k++) {
+            row[PTI_ROW_O + k].v[lane] = (float)all[k];
+            row[PTI_ROW_LOW + k].v[lane] = (float)(all[k] - (double)row[PTI_ROW_O + k].v[lane]);
+        }
+    }
 }
 
 PTI_INLINE pti_mw pti_lock_is(const pti_lock_surface *s, pt_material_kind kind)
@@ -10096,21 +10249,21 @@ PTI_INLINE8 void pti_lock_emission(const pti_lockstep *k, const pti_lock_surface
                                   int technique, pt_heuristic heuristic)
 {
     const pti_fw zero = pti_fw_set(0), one = pti_fw_set(1), q = row[PTI_ROW_DENSITY].f;
-    const pti_fw number = pti_fw_gather(k->of[PTI_OF_LIGHT], s->i);
-    const pti_mw lit = pti_mw_and(s->met, pti_mw_and(pti_fw_le(zero, number), pti_mw_or(s->front, s->ball)));
+    const pti_mw lit = pti_mw_and(s->met, pti_mw_and(pti_fw_le(zero, s->light), pti_mw_or(s->front, s->ball)));
     const pti_mw delta = pti_fw_lt(q, zero);
     pti_uw light;
     pti_w3 value;
     pti_fw p, weight = one;
     if (!pti_mw_bits(lit)) return;
-    light = pti_uw_from_floats(pti_fw_max(zero, number));
+    light = pti_uw_from_floats(pti_fw_max(zero, s->light));
     value = pti_w3_mul(pti_row3(row + PTI_ROW_BETA), pti_gather3(k->light, PTI_LIT_EMISSION, light));
     if (technique != PTI_TECHNIQUE_PLAIN) {
         const pti_fw density = pti_fw_gather(k->light[PTI_LIT_DENSITY], light);
-        p = pti_fw_div(pti_fw_mul(density, pti_fw_mul(best->t, best->t)), s->cosine);
+        p = pti_fw_div(pti_fw_mul(density, pti_fw_mul(best->t, best->t)), s->facing);
         if (k->sphere_lights && pti_mw_bits(pti_mw_and(lit, s->ball))) {
             const pti_w3 c = pti_w3_sub(pti_gather3(k->light, PTI_LIT_P, light), pti_row3(row + PTI_ROW_O));
-            const pti_fw omc = pti_lock_cone(pti_fw_gather(k->light[PTI_LIT_RADIUS], light), pti_w3_dot(c, c));
+            const pti_fw cone = pti_lock_cone(pti_fw_gather(k->light[PTI_LIT_RADIUS], light), pti_w3_dot(c, c));
+            const pti_fw omc = pti_fw_select(s->front, cone, pti_fw_set(2)); /* from within also where the origin lies on the ball */
             p = pti_fw_select(s->ball, pti_fw_div(density, pti_fw_mul(pti_fw_set((float)(2 * PT_PI)), omc)), p);
         }
         weight = pti_fw_select(delta, one, pti_lock_weight(q, p, heuristic));
@@ -10144,11 +10297,11 @@ PTI_INLINE8 void pti_lock_turn(pti_fw u, pti_fw *c, pti_fw *s)
     *s = pti_fw_sub(pti_fw_set(0), y);
 }
 
-/* How far along s->n the next ray starts, if it goes to w: 2 e off the surface, 8 e inside balls. A point of a wall that touches
+/* How far along s->ng the next ray starts, if it goes to w: 2 e off the surface, 8 e inside balls. A point of a wall that touches
    a ball can start no more than 3 e inside it: so pti_lock_balls tells them apart. */
 PTI_INLINE8 pti_fw pti_lock_lift(const pti_lockstep *k, const pti_lock_surface *s, pti_w3 w)
 {
-    const pti_fw zero = pti_fw_set(0), along = pti_w3_dot(s->n, w);
+    const pti_fw zero = pti_fw_set(0), along = pti_w3_dot(s->ng, w);
     const pti_fw out = pti_fw_select(s->front, along, pti_fw_sub(zero, along));
     const pti_fw far = pti_fw_select(pti_mw_and(s->ball, pti_fw_lt(out, zero)), pti_fw_set(8 * k->e), pti_fw_set(2 * k->e));
     return pti_fw_select(pti_fw_lt(along, zero), pti_fw_sub(zero, far), far);
@@ -10159,6 +10312,96 @@ PTI_INLINE int pti_count_bits(unsigned x)
     int n = 0;
     for (; x; x &= x - 1) n++;
     return n;
+}
+
+/* pt_fresnel_conductor in lanes. */
+PTI_INLINE8 pti_fw pti_lock_fresnel(pti_fw c, pti_fw eta, pti_fw k)
+{
+    const pti_fw zero = pti_fw_set(0), one = pti_fw_set(1), half = pti_fw_set(0.5f), c2 = pti_fw_mul(c, c);
+    const pti_fw s2 = pti_fw_mul(pti_fw_sub(one, c), pti_fw_add(one, c)), m = pti_fw_mul(pti_fw_add(eta, eta), k);
+    const pti_fw t = pti_fw_sub(pti_fw_mul(pti_fw_sub(eta, k), pti_fw_add(eta, k)), s2), ab = pti_fw_sqrt(pti_fw_madd(t, t, pti_fw_mul(m, m)));
+    const pti_fw below = pti_fw_mul(half, pti_fw_div(pti_fw_mul(m, m), pti_fw_sub(ab, t))), above = pti_fw_mul(half, pti_fw_add(ab, t));
+    const pti_fw a = pti_fw_sqrt(pti_fw_select(pti_fw_lt(t, zero), below, above)), ac = pti_fw_mul(pti_fw_add(a, a), c);
+    const pti_fw x = pti_fw_add(ab, c2), y = pti_fw_madd(ab, c2, pti_fw_mul(s2, s2)), z = pti_fw_mul(ac, s2);
+    const pti_fw rs = pti_fw_div(pti_fw_sub(x, ac), pti_fw_add(x, ac)), rp = pti_fw_mul(rs, pti_fw_div(pti_fw_sub(y, z), pti_fw_add(y, z)));
+    return pti_fw_select(pti_fw_lt(zero, ab), pti_fw_mul(half, pti_fw_add(rs, rp)), one);
+}
+
+/* What metal reflects under the cosine c. */
+PTI_INLINE8 pti_w3 pti_lock_metal(const pti_lockstep *k, pti_uw i, pti_fw c)
+{
+    const pti_w3 eta = pti_gather3(k->of, PTI_OF_ETA, i), kappa = pti_gather3(k->of, PTI_OF_K, i);
+    return pti_w3_make(pti_lock_fresnel(c, eta.x, kappa.x), pti_lock_fresnel(c, eta.y, kappa.y), pti_lock_fresnel(c, eta.z, kappa.z));
+}
+
+/* GGX facets: a frame with the normal, the direction back in it, alpha and its reciprocal. */
+typedef struct pti_lock_facets {
+    pti_w3 s, t, o;
+    pti_fw alpha, inverse;
+    pti_mw rough;           /* lanes on them; the others have an alpha of 1                                 */
+} pti_lock_facets;
+
+PTI_INLINE8 void pti_lock_find_facets(const pti_lockstep *k, const pti_lock_surface *s, pti_w3 d, pti_lock_facets *f)
+{
+    const pti_fw zero = pti_fw_set(0), alpha = pti_fw_gather(k->of[PTI_OF_ALPHA], s->i);
+    f->rough = pti_fw_lt(zero, alpha);
+    f->alpha = pti_fw_select(f->rough, alpha, pti_fw_set(1));
+    f->inverse = pti_fw_div(pti_fw_set(1), f->alpha);
+    pti_lock_frame(s->n, &f->s, &f->t);
+    f->o = pti_w3_make(pti_fw_sub(zero, pti_w3_dot(d, f->s)), pti_fw_sub(zero, pti_w3_dot(d, f->t)), s->cosine);
+}
+
+/* cos (1 + Lambda) of a direction above the facets, with tan^2 written without its denominator: (z + sqrt(z^2 + a^2 sin^2)) / 2. */
+PTI_INLINE8 pti_fw pti_lock_masked_cosine(const pti_lock_facets *f, pti_w3 w)
+{
+    const pti_fw q = pti_fw_mul(pti_fw_mul(f->alpha, f->alpha), pti_fw_madd(w.x, w.x, pti_fw_mul(w.y, w.y)));
+    return pti_fw_mul(pti_fw_set(0.5f), pti_fw_add(w.z, pti_fw_sqrt(pti_fw_madd(w.z, w.z, q))));
+}
+
+/* The density of the direction that half vector h reflects into: D G1 (o.h) / cos / (4 o.h), see [PT-04]. */
+PTI_INLINE8 pti_fw pti_lock_facet_density(const pti_lock_facets *f, pti_w3 h, pti_fw masked_o)
+{
+    const pti_fw r2 = pti_fw_madd(h.x, h.x, pti_fw_mul(h.y, h.y)), kd = pti_fw_madd(f->alpha, pti_fw_mul(h.z, h.z), pti_fw_mul(r2, f->inverse));
+    return pti_fw_div(pti_fw_set((float)(0.25 / PT_PI)), pti_fw_mul(pti_fw_mul(kd, kd), masked_o));
+}
+
+/* G2 / G1 = (1 + Lambda(o)) / (1 + Lambda(o) + Lambda(i)), with both cosines multiplied in; 0 for i at the horizon. */
+PTI_INLINE8 pti_fw pti_lock_shadowing(const pti_lock_facets *f, pti_w3 i, pti_fw masked_o)
+{
+    const pti_fw above = pti_fw_mul(masked_o, i.z), masked_i = pti_lock_masked_cosine(f, i);
+    return pti_fw_div(above, pti_fw_madd(f->o.z, pti_fw_sub(masked_i, i.z), above));
+}
+
+/* BRDF times cosine, but for the albedo, into i (of the frame, above); *density of i. */
+PTI_INLINE8 pti_w3 pti_lock_reflect(const pti_lockstep *k, const pti_lock_surface *s, const pti_lock_facets *f, pti_w3 i, pti_fw *density)
+{
+    const pti_w3 h = pti_w3_normalize(pti_w3_along(f->o, pti_fw_set(1), i));
+    const pti_fw masked_o = pti_lock_masked_cosine(f, f->o);
+    *density = pti_lock_facet_density(f, h, masked_o);
+    return pti_w3_scale(pti_lock_metal(k, s->i, pti_w3_dot(f->o, h)), pti_fw_mul(*density, pti_lock_shadowing(f, i, masked_o)));
+}
+
+/* A direction by a visible normal, as pti_ggx_visible_draw; its density, and weight multiplied. *above: it is. */
+PTI_INLINE8 pti_w3 pti_lock_glossy(const pti_lockstep *k, const pti_lock_surface *s, const pti_lock_facets *f, pti_fw u0, pti_fw u1, pti_fw *density,
+                                  pti_w3 *weight, pti_mw *above)
+{
+    const pti_fw zero = pti_fw_set(0), one = pti_fw_set(1), masked_o = pti_lock_masked_cosine(f, f->o);
+    const pti_w3 o = pti_w3_normalize(pti_w3_make(pti_fw_mul(f->alpha, f->o.x), pti_fw_mul(f->alpha, f->o.y), f->o.z));
+    const pti_fw top = pti_fw_add(one, o.z), rise = pti_fw_mul(pti_fw_sub(one, u1), top); /* z + o.z of the point of the cap */
+    const pti_fw low = pti_fw_div(pti_fw_madd(o.x, o.x, pti_fw_mul(o.y, o.y)), top);      /* 1 - o.z, with all its digits   */
+    const pti_fw r = pti_fw_sqrt(pti_fw_mul(pti_fw_mul(u1, top), pti_fw_add(rise, low)));  /* of (1 - z) (1 + z)             */
+    pti_fw cosine, sinus, c;
+    pti_w3 h, i, next;
+    pti_lock_turn(u0, &cosine, &sinus);
+    h = pti_w3_make(pti_fw_mul(f->alpha, pti_fw_madd(r, cosine, o.x)), pti_fw_mul(f->alpha, pti_fw_madd(r, sinus, o.y)), rise);
+    h = pti_w3_normalize(h);
+    c = pti_w3_dot(f->o, h);
+    i = pti_w3_sub(pti_w3_scale(h, pti_fw_add(c, c)), f->o);
+    *above = pti_mw_and(pti_fw_lt(zero, c), pti_fw_lt(zero, i.z));
+    *density = pti_lock_facet_density(f, h, masked_o);
+    *weight = pti_w3_mul(*weight, pti_w3_scale(pti_lock_metal(k, s->i, c), pti_lock_shadowing(f, i, masked_o)));
+    next = pti_w3_along(f->s, i.x, pti_w3_along(f->t, i.y, pti_w3_scale(s->n, i.z)));
+    return pti_w3_normalize(next);
 }
 
 /* What is known of the lights chosen; one light is the same for all lanes. */
@@ -10208,14 +10451,14 @@ PTI_INLINE8 pti_fw pti_lock_flat_point(const pti_lockstep *k, pti_uw light, cons
     return pti_lit(k, PTI_LIT_DENSITY, light);
 }
 
-/* Asks a point of a light for its light; how many rays that took. */
-PTI_INLINE8 int pti_lock_direct(const pti_lockstep *k, const pti_lock_surface *s, pti_w3 albedo, pti_mw active, const pti_lock_numbers *u,
-                               pti_lane_row *row, pt_heuristic heuristic)
+/* Asks a point of a light for its light; how many rays that took. hits: for trees; f: NULL where nothing is rough. */
+PTI_INLINE8 int pti_lock_direct(const pti_lockstep *k, const pti_lock_surface *s, const pt_hit *hits, const pti_lock_facets *f, pti_w3 albedo,
+                               pti_mw active, const pti_lock_numbers *u, pti_lane_row *row, pt_heuristic heuristic)
 {
-    const pti_fw zero = pti_fw_set(0), inverse_pi = pti_fw_set((float)(1 / PT_PI));
-    const pti_w3 o = pti_w3_along(s->n, pti_lock_lift(k, s, s->n), s->p);
-    pti_fw number = zero, density, distance2, distance, here, there, p, weight;
-    pti_w3 q, n, w, to;
+    const pti_fw zero = pti_fw_set(0);
+    const pti_w3 o = pti_w3_along(s->ng, pti_lock_lift(k, s, s->ng), s->p);
+    pti_fw number = zero, density, distance2, distance, here, there, p, other, weight;
+    pti_w3 q, n, w, to, value;
     pti_mw flat = pti_mw_of_bits(~0u);
     pti_lock_best end;
     pti_uw light;
@@ -10238,16 +10481,25 @@ PTI_INLINE8 int pti_lock_direct(const pti_lockstep *k, const pti_lock_surface *s
     there = pti_fw_sub(zero, pti_w3_dot(n, w));
     p = pti_fw_select(flat, pti_fw_div(pti_fw_mul(density, distance2), there), density);
     active = pti_mw_and(active, pti_mw_and(pti_fw_lt(zero, here), pti_fw_lt(zero, p)));
+    if (k->shading) active = pti_mw_and(active, pti_fw_lt(zero, pti_w3_dot(s->ng, w)));
     rays = pti_count_bits(pti_mw_bits(active));
     if (rays == 0) return 0;
     end.t = distance;
     end.i = end.margin = end.key = zero;
-    weight = pti_fw_div(pti_fw_mul(here, inverse_pi), p);
-    weight = pti_fw_mul(weight, pti_lock_weight(p, pti_fw_mul(here, inverse_pi), heuristic));
-    weight = pti_fw_select(pti_lock_ask(k, o, w, k->e, &end, PTI_LOCK_ANY), zero, weight);
+    other = pti_fw_mul(here, pti_fw_set((float)(1 / PT_PI)));
+    value = pti_w3_scale(albedo, other);
+    if (f && pti_mw_bits(f->rough)) {
+        pti_fw of_facets;
+        const pti_w3 reflected = pti_lock_reflect(k, s, f, pti_w3_make(pti_w3_dot(w, f->s), pti_w3_dot(w, f->t), here), &of_facets);
+        const pti_mw some = pti_mw_and(f->rough, active); /* elsewhere there may be no number */
+        value = pti_w3_select(some, pti_w3_mul(albedo, reflected), value);
+        other = pti_fw_select(some, of_facets, other);
+    }
+    weight = pti_fw_div(pti_lock_weight(p, other, heuristic), p);
+    weight = pti_fw_select(k->tree ? pti_lock_blocked(k, hits, pti_mw_bits(active), q, w) : pti_lock_ask(k, o, w, k->e, &end, PTI_LOCK_ANY), zero, weight);
     weight = pti_fw_select(active, weight, zero);
-    albedo = pti_w3_mul(albedo, pti_w3_mul(pti_row3(row + PTI_ROW_BETA), pti_lit3(k, PTI_LIT_EMISSION, light)));
-    pti_row3_set(row + PTI_ROW_SUM, pti_w3_along(albedo, weight, pti_row3(row + PTI_ROW_SUM)));
+    value = pti_w3_mul(value, pti_w3_mul(pti_row3(row + PTI_ROW_BETA), pti_lit3(k, PTI_LIT_EMISSION, light)));
+    pti_row3_set(row + PTI_ROW_SUM, pti_w3_along(value, weight, pti_row3(row + PTI_ROW_SUM)));
     return rays;
 }
 
@@ -10283,9 +10535,38 @@ PTI_INLINE8 pti_w3 pti_lock_specular(const pti_lockstep *k, const pti_lock_surfa
     const pti_w3 mirrored = pti_w3_along(s->n, two_cosines, d);
     const pti_w3 refracted = pti_w3_along(s->n, pti_fw_nmadd(other, one, pti_fw_mul(eta, s->cosine)), pti_w3_scale(d, eta));
     const pti_w3 grey = pti_w3_make(pti_fw_select(bent, eta2, one), pti_fw_select(bent, eta2, one), pti_fw_select(bent, eta2, one));
+    if (k->metal) *weight = pti_w3_select(pti_lock_is(s, PT_MATERIAL_CONDUCTOR), pti_w3_mul(*weight, pti_lock_metal(k, s->i, s->cosine)), *weight);
     *weight = pti_w3_select(glass, grey, *weight);
     row[PTI_ROW_ETA2].f = pti_fw_select(bent, pti_fw_div(row[PTI_ROW_ETA2].f, eta2), row[PTI_ROW_ETA2].f);
     return pti_w3_normalize(pti_w3_select(bent, refracted, mirrored));
+}
+
+/* The next direction of every lane, its density (-1 of delta lobes), and weight multiplied; lanes of *go that it ends leave it. */
+PTI_INLINE8 pti_w3 pti_lock_scatter(const pti_lockstep *k, const pti_lock_surface *s, const pti_lock_facets *f, pti_w3 d, const pti_lock_numbers *u,
+                                   pti_w3 *weight, pti_fw *density, pti_lane_row *row, pti_mw *go)
+{
+    const pti_mw all = pti_mw_of_bits(~0u), diffuse = k->specular ? pti_lock_is(s, PT_MATERIAL_DIFFUSE) : all;
+    pti_fw cosine;
+    pti_w3 next = pti_lock_cosine(s->n, u->bsdf0, u->bsdf1, &cosine);
+    *density = pti_fw_mul(cosine, pti_fw_set((float)(1 / PT_PI)));
+    if (k->specular && pti_mw_bits(diffuse) != pti_mw_bits(all)) {
+        pti_w3 before = *weight;
+        next = pti_w3_select(diffuse, next, pti_lock_specular(k, s, d, u->lobe, weight, row));
+        *density = pti_fw_select(diffuse, *density, pti_fw_set(-1));
+        if (f && pti_mw_bits(f->rough)) {
+            pti_fw of_facets;
+            pti_mw above;
+            next = pti_w3_select(f->rough, pti_lock_glossy(k, s, f, u->bsdf0, u->bsdf1, &of_facets, &before, &above), next);
+            *weight = pti_w3_select(f->rough, before, *weight);
+            *density = pti_fw_select(f->rough, of_facets, *density);
+            *go = pti_mw_and(*go, pti_mw_or(above, pti_fw_le(pti_fw_gather(k->of[PTI_OF_ALPHA], s->i), pti_fw_set(0))));
+        }
+    }
+    if (k->shading) { /* both normals must agree on the sides */
+        const pti_fw zero = pti_fw_set(0), sides = pti_fw_mul(pti_w3_dot(s->n, next), pti_w3_dot(s->ng, next));
+        *go = pti_mw_and(*go, pti_mw_and(pti_fw_lt(zero, sides), pti_mw_or(diffuse, pti_fw_lt(zero, s->cosine))));
+    }
+    return next;
 }
 
 /* Russian roulette, as pti_roulette; the lanes that go on. */
@@ -10314,6 +10595,7 @@ typedef struct pti_lock_work {
     unsigned hit;                   /* lanes whose first edge met something, and what that is: albedo,     */
     pti_lane_row seen[7];           /*   normal, distance                                                  */
     pti_lane_row row[PTI_ROWS];
+    pt_hit hits[PTI_WIDTH];         /* what lanes have met, where a tree is asked                           */
     uint32_t queue[PTI_LOCK_QUEUE][PTI_ROWS]; /* paths that wait for a lane                                */
     double slots[PTI_LOCK_SLOTS][3]; /* what each path has found                                           */
 } pti_lock_work;
@@ -10337,40 +10619,40 @@ static unsigned pti_lock_vertex(pti_lock_work *w, pti_lane_row *row, unsigned ac
     const pti_w3 o = pti_row3(row + PTI_ROW_O), d = pti_row3(row + PTI_ROW_D);
     const pti_fw zero = pti_fw_set(0);
     pti_lock_surface s;
+    pti_lock_facets f;
+    const pti_lock_facets *facets = NULL;
     pti_lock_best best;
     pti_w3 weight, beta, next;
-    pti_fw cosine, density;
+    pti_fw density;
     pti_mw go;
-    pti_lock_nearest(k, o, d, first ? k->e_camera : k->e, &best);
     w->rays += (uint64_t)pti_count_bits(active);
+    if (k->tree) {
+        pti_lock_meet(k, row, active, w->hits, &best, &s);
+    } else {
+        pti_lock_nearest(k, o, d, first ? k->e_camera : k->e, &best);
+        pti_lock_land(k, o, d, &best, &s);
+    }
     s.met = pti_mw_and(pti_mw_of_bits(active), pti_fw_lt(best.t, pti_fw_set(PTI_LOCK_FAR)));
-    pti_lock_land(k, o, d, &best, &s);
     if (first && w->describes) pti_lock_describe(w, &s, &best);
     pti_lock_emission(k, &s, &best, row, w->technique, options->heuristic);
     go = s.met;
     if (options->max_edges > 0) go = pti_mw_and(go, pti_fw_lt(pti_fw_from_words(row[PTI_ROW_EDGES].u), pti_fw_set((float)options->max_edges)));
     if (!pti_mw_bits(go)) return 0;
     weight = pti_gather3(k->of, PTI_OF_ALBEDO, s.i);
+    if (k->rough) pti_lock_find_facets(k, &s, d, &f), facets = &f;
     if (w->technique != PTI_TECHNIQUE_PLAIN && k->light_count > 0) {
-        const pti_mw asks = k->specular ? pti_mw_and(go, pti_lock_is(&s, PT_MATERIAL_DIFFUSE)) : go;
-        w->rays += (uint64_t)pti_lock_direct(k, &s, weight, asks, u, row, options->heuristic);
+        pti_mw asks = k->specular ? pti_mw_and(go, pti_lock_is(&s, PT_MATERIAL_DIFFUSE)) : go;
+        if (facets) asks = pti_mw_or(asks, pti_mw_and(pti_mw_and(go, pti_fw_lt(zero, s.cosine)), facets->rough));
+        w->rays += (uint64_t)pti_lock_direct(k, &s, w->hits, facets, weight, asks, u, row, options->heuristic);
     }
-    next = pti_lock_cosine(s.n, u->bsdf0, u->bsdf1, &cosine);
-    density = pti_fw_mul(cosine, pti_fw_set((float)(1 / PT_PI)));
-    if (k->specular) {
-        const pti_mw diffuse = pti_lock_is(&s, PT_MATERIAL_DIFFUSE);
-        if (pti_mw_bits(diffuse) != pti_mw_bits(pti_mw_of_bits(~0u))) {
-            const pti_w3 bounced = pti_lock_specular(k, &s, d, u->lobe, &weight, row);
-            next = pti_w3_select(diffuse, next, bounced);
-            density = pti_fw_select(diffuse, density, pti_fw_set(-1));
-        }
-    }
+    next = pti_lock_scatter(k, &s, facets, d, u, &weight, &density, row, &go);
     beta = pti_w3_mul(pti_row3(row + PTI_ROW_BETA), weight);
     go = pti_mw_and(go, pti_fw_lt(zero, pti_fw_max(beta.x, pti_fw_max(beta.y, beta.z))));
     if (options->roulette != PT_ROULETTE_NONE) go = pti_mw_and(go, pti_lock_roulette(options, row, &beta, u_roulette));
     pti_row3_set(row + PTI_ROW_BETA, beta);
     pti_row3_set(row + PTI_ROW_D, next);
-    pti_row3_set(row + PTI_ROW_O, pti_w3_along(s.n, pti_lock_lift(k, &s, next), s.p));
+    if (k->tree) pti_lock_depart(row, w->hits, pti_mw_bits(go));
+    else pti_row3_set(row + PTI_ROW_O, pti_w3_along(s.n, pti_lock_lift(k, &s, next), s.p));
     row[PTI_ROW_DENSITY].f = density;
     row[PTI_ROW_EDGES].u = pti_uw_add(row[PTI_ROW_EDGES].u, pti_uw_set(1));
     return pti_mw_bits(go);
@@ -10445,6 +10727,7 @@ static void pti_lock_start(pti_lock_work *w, pti_lane_row *row, unsigned active,
     row[PTI_ROW_DENSITY].f = pti_fw_set(-1);
     row[PTI_ROW_ETA2].f = one;
     row[PTI_ROW_EDGES].u = pti_uw_set(1);
+    pti_row3_set(row + PTI_ROW_LOW, pti_w3_make(zero, zero, zero));
     on = pti_lock_vertex(w, row, active, u, roulette, 1);
     pti_lock_flush(w, row, active & ~on);
     for (on &= active; on; on &= on - 1) {
@@ -12909,7 +13192,8 @@ static int pti_pick_lockstep(const pt_method *method, const pt_scene *scene, con
 #endif
     if (d->no_lockstep || d->general_body || d->sampler == PT_SAMPLER_STRATIFIED) return 0;
     if (d->li.max_edges >= 1 << 24 || d->li.roulette_start >= 1 << 24) return 0; /* they are counted in floats */
-    return pti_lockstep_make(out, scene, pt_v3(pti_fabs(c->position.x) + ahead, pti_fabs(c->position.y) + ahead, pti_fabs(c->position.z) + ahead));
+    if (pti_lockstep_make(out, scene, pt_v3(pti_fabs(c->position.x) + ahead, pti_fabs(c->position.y) + ahead, pti_fabs(c->position.z) + ahead))) return 1;
+    return pti_lockstep_make_tree(out, scene);
 }
 #endif
 
@@ -13725,7 +14009,7 @@ static pt_result pti_render(pti_pass *p, pt_film *film, pt_report *report)
 #if PTI_HAS_LOCKSTEP
     if (pti_pick_lockstep(method, p->scene, d, &lockstep, &p->technique)) {
         p->lockstep = &lockstep;
-        report->body = PTI_WIDTH == 16 ? "lockstep16" : "lockstep8";
+        report->body = PTI_WIDTH == 16 ? (lockstep.tree ? "lockstep16-tree" : "lockstep16") : lockstep.tree ? "lockstep8-tree" : "lockstep8";
     }
 #endif
     p->options = d->li;

@@ -110,7 +110,7 @@ static inline pt_render_desc desc_of(const stage *s, int width, int height, uint
     return d;
 }
 
-/* Renders; lockstep: must it, or must it not, be in lockstep? -1: whichever. */
+/* Renders; lockstep: must it, or must it not, be in lockstep? 2: and by the scene's tree; -1: whichever. */
 static inline pt_film render(const stage *s, const pt_render_desc *d, int lockstep, uint64_t *rays)
 {
     pt_film film = PT_FILM_INIT;
@@ -118,9 +118,11 @@ static inline pt_film render(const stage *s, const pt_render_desc *d, int lockst
     const pt_result result = pt_render(&s->scene, d, &film, &report);
     pt_check(result == PT_OK, "pt_render", "%s", report.error ? report.error : pt_result_string(result));
     pt_check(report.nonfinite == 0, "nothing but numbers", "%.0f are not finite", (double)report.nonfinite);
-    if (report.body && lockstep >= 0)
-        pt_check((strncmp(report.body, "lockstep", 8) == 0) == (lockstep && !(d->method && strcmp(d->method, "path-light") == 0)), "which body renders",
+    if (report.body && lockstep >= 0) {
+        const int taken = lockstep && !(d->method && strcmp(d->method, "path-light") == 0);
+        pt_check((strncmp(report.body, "lockstep", 8) == 0) == taken && (strstr(report.body, "-tree") != NULL) == (taken && lockstep == 2), "which body renders",
                  "%s", report.body);
+    }
     if (rays) *rays = report.rays;
     pt_report_free(&report);
     return film;
@@ -181,9 +183,10 @@ static inline double within(double bound) { return pt_test_long() ? 0.4 * bound 
 /* ---- rooms ------------------------------------------------------------------------------------------------ */
 
 /* Rooms [-1,1]^3 of coloured walls, and what is in them. */
-enum { SPHERES, GLASS_BOX, MANY_LAMPS, IN_GLASS, TURNED_LAMPS, GLOWING, MESH, ROOMS };
+enum { SPHERES, GLASS_BOX, MANY_LAMPS, IN_GLASS, TURNED_LAMPS, GLOWING, MESH, METALS, SMOOTH, ROOMS };
 static const char *const room_names[ROOMS] = {"mirror and glass sphere", "glass and mirror box", "many lamps", "eye in a glass sphere",
-                                              "lamps from behind", "things that glow", "turned room of triangles"};
+                                              "lamps from behind", "things that glow", "turned room of triangles", "metal, rough and smooth",
+                                              "smooth meshes"};
 
 static inline void add_walls(pt_scene *s, int made, const place *at)
 {
@@ -202,7 +205,33 @@ static inline void add_lamp(pt_scene *s, const place *at, double x, double y, do
     add_face(s, PARALLELOGRAM, at, c, up ? b : a, up ? a : b, material);
 }
 
-static inline stage room(int kind)
+/* A ball of triangles with the ball's normals. */
+static inline void add_smooth_ball(pt_scene *s, double x, double y, double z, double r, int material)
+{
+    enum { AROUND = 12, UP = 6 };
+    pt_vec3 p[AROUND * (UP + 1)], n[AROUND * (UP + 1)];
+    uint32_t index[AROUND * UP * 6];
+    uint32_t i, j, k = 0;
+    for (j = 0; j <= UP; j++)
+        for (i = 0; i < AROUND; i++) {
+            const double a = 2 * PT_PI * i / AROUND, b = PT_PI * j / UP;
+            n[AROUND * j + i] = v3(sin(b) * cos(a), cos(b), sin(b) * sin(a));
+            p[AROUND * j + i] = v3(x + r * sin(b) * cos(a), y + r * cos(b), z + r * sin(b) * sin(a));
+        }
+    for (j = 0; j < UP; j++)
+        for (i = 0; i < AROUND; i++) {
+            const uint32_t a = AROUND * j + i, b = AROUND * j + (i + 1) % AROUND, c = a + AROUND, d = b + AROUND;
+            if (j > 0) index[k++] = a, index[k++] = b, index[k++] = c;
+            if (j + 1 < UP) index[k++] = b, index[k++] = d, index[k++] = c;
+        }
+    pt_add_mesh(s, p, n, NULL, AROUND * (UP + 1), index, k / 3, material);
+}
+
+/* What small scenes cannot have, where nobody sees it: then the scene's tree is asked. */
+static inline void add_speck(pt_scene *s, const place *at) { add_ball(s, at, 1.2, 0, 0, 0.0002, diffuse(s, 0.5, 0.5, 0.5)); }
+
+/* by_tree: with a speck. */
+static inline stage room_of(int kind, int by_tree)
 {
     const place turned = {0.6, 1, 0.2, 0.1, 0}, inside = {0.5, 1, 0.1, -0.3, -0.1}, *at = kind == MESH ? &turned : &HERE;
     const int white = kind == MANY_LAMPS || kind == TURNED_LAMPS ? 2 : 4;
@@ -240,6 +269,14 @@ static inline stage room(int kind)
             m.emission = grey(4);
             add_lamp(&s.scene, at, -0.9 + 0.6 * i, -0.3 + 0.2 * i, -0.5, 0.5, 1, pt_add_material(&s.scene, m));
         }
+    if (kind == METALS) {
+        const pt_rgb eta = rgb(0.14, 0.37, 1.44), k = rgb(3.98, 2.38, 1.6);
+        add_ball(&s.scene, at, -0.5, -0.55, -0.4, 0.4, pt_add_material(&s.scene, pt_material_conductor(eta, k, (pt_real)0.5)));
+        add_ball(&s.scene, at, 0.5, -0.5, 0, 0.4, pt_add_material(&s.scene, pt_material_conductor(rgb(1.5, 0.9, 0.6), rgb(7, 6, 5), 0)));
+        add_lamp(&s.scene, at, -0.9, -0.96, 0.1, 0.9, 1, pt_add_material(&s.scene, pt_material_conductor(k, eta, (pt_real)0.15)));
+        add_ball(&s.scene, at, 0.1, 0.3, -0.6, 0.2, material_of(&s.scene, pt_material_conductor(grey(2), grey(3), (pt_real)0.8), 0.3));
+        add_ball(&s.scene, at, -0.5, 0.2, 0.3, 0.1, lamp(&s.scene, 3, 2, 1));
+    }
     if (kind == GLOWING) {
         add_ball(&s.scene, at, -0.55, -0.5, -0.3, 0.4, material_of(&s.scene, pt_material_diffuse(rgb(0.5, 0.6, 0.7)), 1));
         add_ball(&s.scene, at, 0.5, -0.5, -0.2, 0.4, material_of(&s.scene, pt_material_dielectric((pt_real)1.4), 0.5));
@@ -247,9 +284,17 @@ static inline stage room(int kind)
         add_lamp(&s.scene, at, -0.5, 0.9, -0.5, 1, 0, material_of(&s.scene, pt_material_mirror(grey(0.8)), 3));
         add_cube(&s.scene, PARALLELOGRAM, &inside, -0.25, 0.2, 1, material_of(&s.scene, pt_material_dielectric((pt_real)1.5), 0.4));
     }
+    if (kind == SMOOTH) {
+        add_smooth_ball(&s.scene, -0.5, -0.55, -0.4, 0.4, diffuse(&s.scene, 0.7, 0.6, 0.5));
+        add_smooth_ball(&s.scene, 0.5, -0.5, 0, 0.4, glass);
+        add_smooth_ball(&s.scene, 0, 0.2, -0.6, 0.3, pt_add_material(&s.scene, pt_material_conductor(grey(1.5), grey(4), (pt_real)0.4)));
+        add_smooth_ball(&s.scene, 0.1, -0.75, 0.3, 0.2, mirror);
+    }
+    if (by_tree) add_speck(&s.scene, at);
     commit(&s);
     return s;
 }
+static inline stage room(int kind) { return room_of(kind, 0); }
 
 /* bound: of the whole picture; blocks have none. */
 static inline void compare(const char *name, const picture *a, const picture *b, double bound)
