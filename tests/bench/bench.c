@@ -364,7 +364,8 @@ static void bench_render(void)
    sampling are the same, number by number, so that what the second traces are nearest hits, and the rest shadow rays. What
    one costs is measured on rays of the same kind, traced alone, without anything else that a path does: walks from the
    camera, pixel after pixel, that scatter as the materials do, with as many edges in the mean as paths have; at each vertex
-   a point of a light is asked for. A body that walks with several paths asks its own kernel, a ray in each lane. */
+   a point of a light is asked for. Paths that walk together through a small scene ask a kernel of their own, a ray in each
+   lane; all others ask the tree, one ray after the other. */
 typedef struct floor_scene {
     const char *name;
     pt_scene scene;
@@ -535,6 +536,17 @@ static int is_lockstep(floor_scene *f)
 #endif
 }
 
+/* Are the rays of such a scene asked a lane each? */
+static int has_kernel(const floor_scene *f)
+{
+#if PTI_HAS_LOCKSTEP
+    return f->lanes.tree == NULL;
+#else
+    (void)f;
+    return 0;
+#endif
+}
+
 /* One row: nanoseconds a path, over those of its rays alone. */
 static void print_floor(const char *prefix, floor_scene *f, int body, int lanes)
 {
@@ -578,9 +590,9 @@ static void bench_floor(void)
         memset(&f, 0, sizeof f);
         f.name = scenes[i].name;
         if (scenes[i].make(&f.scene, &f.camera) == PT_OK) {
-            const int lanes = is_lockstep(&f);
-            print_floor("floor.", &f, AS_IT_IS, lanes);
-            if (lanes) print_floor("floor_one_at_a_time.", &f, ONE_AT_A_TIME, 0);
+            const int together = is_lockstep(&f);
+            print_floor("floor.", &f, AS_IT_IS, together && has_kernel(&f));
+            if (together) print_floor("floor_one_at_a_time.", &f, ONE_AT_A_TIME, 0);
         }
         pt_scene_free(&f.scene);
     }
