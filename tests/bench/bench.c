@@ -292,20 +292,45 @@ static const char *feature_words(unsigned features, char *buffer, size_t size)
     return buffer;
 }
 
-/* How many of the 23 features a scene needs, and which were left out. */
-static void print_needs(const char *scene, unsigned needs)
+/* A row of a set of features: how many of the 23 they are, and which. */
+static void print_features(const char *prefix, const char *scene, unsigned features)
 {
-    char words[512];
+    char name[96], words[512];
     int bits = 0, k;
 
-    for (k = 0; k < 23; k++) bits += (int)(needs >> k & 1u);
-    printf("needs.%s,%d,features: %s,23,%.3f\n", scene, bits, feature_words(needs, words, sizeof words), bits / 23.0);
-    printf("left_out.%s,%d,features: %s,23,%.3f\n", scene, 23 - bits, feature_words(PT_NEEDS_ALL & ~needs, words, sizeof words),
-           1 - bits / 23.0);
+    for (k = 0; k < 23; k++) bits += (int)(features >> k & 1u);
+    snprintf(name, sizeof name, "%s%s", prefix, scene);
+    if (is_wanted(name)) printf("%s,%d,features: %s,23,%.3f\n", name, bits, feature_words(features, words, sizeof words), bits / 23.0);
 }
 
-/* What each scene needs, which body renders it, and whether the smallest one for one path at a time has the bits of the general
-   one (value 1). */
+/* What a scene needs, and what it does not: what of that runs all the same, code_run.SCENE says. */
+static void print_needs(const char *scene, unsigned needs)
+{
+    print_features("needs.", scene, needs);
+    print_features("not_needed.", scene, PT_NEEDS_ALL & ~needs);
+}
+
+/* Which body renders a scene, and whether the smallest one for one path at a time has the bits of the general one (1). */
+static void print_same_bits(const char *name, const pt_scene *scene, const pt_camera *camera)
+{
+    pt_film film[BODIES] = {PT_FILM_INIT, PT_FILM_INIT, PT_FILM_INIT};
+    pt_report report[BODIES] = {PT_REPORT_INIT, PT_REPORT_INIT, PT_REPORT_INIT};
+    const size_t bytes = 3 * 32 * 32 * sizeof(double);
+    int k, ok = 1;
+
+    for (k = 0; k < BODIES; k++) ok = ok && render_body(scene, camera, k, &film[k], &report[k]);
+    if (ok) {
+        k = memcmp(film[ONE_AT_A_TIME].half[0], film[GENERAL].half[0], bytes) == 0 &&
+            memcmp(film[ONE_AT_A_TIME].half[1], film[GENERAL].half[1], bytes) == 0;
+        printf("%s,%d,%s body; one at a time: %s body,1,%d\n", name, k, report[AS_IT_IS].body, report[ONE_AT_A_TIME].body, k);
+    }
+    for (k = 0; k < BODIES; k++) {
+        pt_film_free(&film[k]);
+        pt_report_free(&report[k]);
+    }
+    fflush(stdout);
+}
+
 static void bench_needs(void)
 {
     int count, i;
@@ -313,27 +338,16 @@ static void bench_needs(void)
 
     for (i = 0; i < count; i++) {
         pt_scene scene = PT_SCENE_INIT;
-        pt_film film[3] = {PT_FILM_INIT, PT_FILM_INIT, PT_FILM_INIT};
-        pt_report report[3] = {PT_REPORT_INIT, PT_REPORT_INIT, PT_REPORT_INIT};
         char name[96];
         pt_camera camera;
-        int k, ok = scenes[i].make(&scene, &camera) == PT_OK;
 
-        for (k = 0; k < 3; k++) ok = ok && render_body(&scene, &camera, k, &film[k], &report[k]);
-        snprintf(name, sizeof name, "needs.%s", scenes[i].name);
-        if (ok && is_wanted(name)) {
+        if (scenes[i].make(&scene, &camera) == PT_OK) {
             print_needs(scenes[i].name, pt_scene_needs(&scene));
-            k = memcmp(film[1].half[0], film[2].half[0], 3 * 32 * 32 * sizeof(double)) == 0 &&
-                memcmp(film[1].half[1], film[2].half[1], 3 * 32 * 32 * sizeof(double)) == 0;
-            printf("same_bits.%s,%d,%s body; one at a time: %s body,1,%d\n", scenes[i].name, k, report[0].body, report[1].body, k);
-        }
-        for (k = 0; k < 3; k++) {
-            pt_film_free(&film[k]);
-            pt_report_free(&report[k]);
+            snprintf(name, sizeof name, "same_bits.%s", scenes[i].name);
+            if (is_wanted(name)) print_same_bits(name, &scene, &camera);
         }
         pt_scene_free(&scene);
     }
-    fflush(stdout);
 }
 
 /* What bodies save: each scene by the general one, by the smallest for one path at a time, and as it is rendered. */
