@@ -31,7 +31,7 @@ SPP = 64
 SHARES = $(shell k=1; while [ $$k -le $(JOBS) ]; do echo $$k; k=$$((k + 1)); done)
 TESTS = $(patsubst tests/%.c,%,$(wildcard tests/test_*.c))
 # Those that take longest begin first, so that none is left alone at the end; scripts look at no numbers.
-LONGEST = $(filter test_transport test_lockstep_plain test_oracles test_lockstep test_materials test_radiometry,$(TESTS))
+LONGEST = $(filter test_transport test_lockstep_plain test_together test_oracles test_lockstep test_materials test_radiometry,$(TESTS))
 SCRIPTS = $(if $(SEED),,switches tool docs sections lessons)
 STARTED = $(LONGEST:%=build/test/%.log) $(SCRIPTS:%=build/test/check_%.log) $(TESTS:%=build/test/%.log)
 TEST_LOGS = $(SCRIPTS:%=build/test/check_%.log) $(TESTS:%=build/test/%.log)

@@ -1,4 +1,4 @@
-/* pathtracer.h - v0.4.0 - a path tracer in one C99 header: render by the rendering equation,
+/* pathtracer.h - v0.5.0 - a path tracer in one C99 header: render by the rendering equation,
    know how wrong the picture still is, and how long that took.      MIT-0 or public domain, see the end.
 
    Do this in exactly ONE C or C++ file, and include the header plainly everywhere else:
@@ -60,7 +60,7 @@
        [PT-09] lights
        [PT-10] scene, camera, film
        [PT-11] integrators: path tracing, Whitted, distribution, branching; light-path expressions
-       [PT-11b] lockstep: path tracing of small scenes, 8 or 16 paths at a time
+       [PT-11b] lockstep: path tracing with 8 or 16 paths at a time
        [PT-17] files: pictures (PPM, PFM, PNG), films, models (OBJ with MTL)
        [PT-18] render driver: passes, threads, budgets, error against run time
        [PT-19] canonical scenes
@@ -114,9 +114,10 @@
        Decisions (does this ray meet this sphere, which side of this edge) are made in double from
        the pt_real input. No constant is tuned to the size of a scene: rays start at an offset that
        follows from the rounding error of their own origin ([PT-06]). Sums over samples are double.
-       Small scenes of diffuse surfaces, mirrors and glass are rendered by paths that walk in lockstep
-       ([PT-11b]): they decide in float, between primitives that are wider by the rounding of a hit.
-       desc.no_lockstep asks for one path at a time; the two agree in the mean, not in their bits.
+       Scenes of diffuse surfaces, mirrors, smooth glass and metal under at most 64 area lights are
+       rendered by paths that walk in lockstep ([PT-11b]), in float; up to 64 primitives are decided in
+       float as well, between primitives that are wider by the rounding of a hit. desc.no_lockstep asks
+       for one path at a time; the two agree in the mean, not in their bits.
        Build with -ffp-contract=off when two builds or two instances of the path integrator must give
        the same bits: a fused multiply-add rounds once where two operations round twice, and a
        compiler may fuse differently in each copy. Hits and misses of triangles do not depend on it.
@@ -198,9 +199,9 @@
    ===================================================================================================== */
 
 #define PT_VERSION_MAJOR 0
-#define PT_VERSION_MINOR 4
+#define PT_VERSION_MINOR 5
 #define PT_VERSION_PATCH 0
-#define PT_VERSION_STRING "0.4.0"
+#define PT_VERSION_STRING "0.5.0"
 
 #if (defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ > 0) || \
      defined(__ASSOCIATIVE_MATH__) || defined(__RECIPROCAL_MATH__) || defined(_M_FP_FAST)) && \
@@ -9284,8 +9285,9 @@ PTDEF pt_rgbd pt_li_branching(const pt_scene *scene, const pt_ray *ray, pt_sampl
    =====================================================================================================
    A path of a small scene spends its time on a few dozen multiplications at a time, one path after the other. Here as
    many paths as the machine has lanes walk together: each instruction takes one step of all of them, and a lane whose
-   path has ended takes the next path from a queue ([Lai13] for GPUs; here it is the lanes of one core). The estimator
-   is that of pti_path, with three differences that change no expectation:
+   path has ended takes the next path from a queue ([Lai13] for GPUs; here it is the lanes of one core). Scenes of more
+   than 64 primitives ask their tree for one ray after the other, and do the rest in lanes. The estimator is that of
+   pti_path, with three differences that change no expectation:
 
    - Lights are sampled by area (spheres by their cone), which has no bound where a light touches a surface, so never
      without the weights of multiple importance sampling [Vea97] 9.2: the method "path-light" is left to pti_path. Where
@@ -9298,7 +9300,8 @@ PTDEF pt_rgbd pt_li_branching(const pt_scene *scene, const pt_ray *ray, pt_sampl
      16 e from the primitive's edges, and the next ray starts 2 e above it; e is the bound of the distance of a computed
      point from its plane (derived at pti_lockstep_make). Primitives are wider by what rounding can do to a hit, so
      that no ray passes between two that share an edge. Scenes with parts smaller than 2048 e, or with edges sharper than
-     8 degrees, are left to pti_path. A ball that touches a wall is not seen from within sqrt(4 e r) of the contact.
+     8 degrees, ask their tree. A ball that touches a wall is not seen from within sqrt(4 e r) of the contact. The tree
+     decides as ever, and its hits keep their digits; of a lamp, whose points are in float, e is that of its own place.
 
    A shadow ray starts and ends on surfaces. A plane that has all surfaces on one side cannot come between two points
    of them: the walls of a room are not asked. Parallelograms whose edges follow two axes are tested by three
@@ -14724,6 +14727,7 @@ PTDEF const pt_scene_entry *pt_scene_find(const char *name)
 /*
    VERSION HISTORY
 
+   0.5.0 (2026-11-22)  paths walk in lockstep in scenes of any size, with metal, rough and smooth, and shading normals.
    0.4.0 (2026-11-22)  SIMD lanes (PT_NO_SIMD and PT_NO_INTRINSICS leave them out): a wide tree of eight children a node,
                        built on several threads, and lanes for small scenes find the same hits faster (scene.tree chooses);
                        small scenes of diffuse surfaces, mirrors and glass are rendered by paths that walk in lockstep

@@ -1,6 +1,7 @@
 #!/bin/sh
-# The lessons: each one has the parts that it must have, builds without a warning and runs once with SHORT=1; what
-# lessons/README.md says of them is what stands in them; tags, functions and files that they name exist.
+# The lessons: each one has the parts that it must have; what lessons/README.md says of them is what stands in them;
+# tags, functions and files that they name exist. With LONG=1 or PROGRAMS=1 each also builds without a warning and runs
+# once with SHORT=1.
 #
 #   sh tests/check_lessons.sh        in the project's top directory; CC, CFLAGS and EXTRA are respected
 #
@@ -159,7 +160,9 @@ none 'lessons/README.md has the titles, ideas, code and words of the lessons (ma
 
 # ---- the programs --------------------------------------------------------------------------------
 
-for name in $lessons; do
+programs=$lessons
+[ -n "${LONG-}${PROGRAMS-}" ] || programs=
+for name in $programs; do
     if ! sh lessons/course.sh quick "$name" '' "$dir/$name" > "$dir/$name.cc" 2>&1; then
         check 1 "$name builds"
         head -n 5 "$dir/$name.cc"
