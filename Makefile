@@ -65,7 +65,7 @@ help:
 	@echo 'make course     the same, and lessons/README.md and lessons/img/ made anew from them'
 	@echo 'make exercises  build each lesson with each of its exercises, -DEX=1 and on, and run it; N=07 tries one'
 	@echo 'make examples   build and run the programs of examples/'
-	@echo 'make bench      rays per second, compile time, what leaving out saves; CSV on stdout'
+	@echo 'make bench      rays per second, what a path costs over its rays, what leaving out saves, compile time; CSV on stdout'
 	@echo 'make bench-embree rays and tree against Embree 3 where it is installed; CSV on stdout; MESHES=room-118k'
 	@echo 'make report     error against run time of all scenes and methods: build/report/index.html; SCENE METHOD SECONDS=60'
 	@echo 'make book       the course as one page: build/book/index.html'
@@ -220,7 +220,8 @@ build/bench: tests/bench/bench.c pathtracer.h build/flags
 REPORT_SCENE = $(if $(filter command line environment,$(origin SCENE)),--scene $(SCENE))
 report: build/report/program
 	@mkdir -p build/report/references
-	build/report/program build/report --seconds $(if $(filter command line environment,$(origin SECONDS)),$(SECONDS),60) $(REPORT_SCENE) $(if $(METHOD),--method $(METHOD))
+	build/report/program build/report --seconds $(if $(filter command line environment,$(origin SECONDS)),$(SECONDS),60) $(REPORT_SCENE) $(if $(METHOD),--method $(METHOD)) \
+	    --flags '$(strip $(FIXED) $(CFLAGS) $(EXTRA))'
 
 build/report/program: tests/bench/report.c pathtracer.h build/flags
 	@mkdir -p build/report
