@@ -1441,6 +1441,61 @@ static void layers(void)
     layers_of(IN_GLASS); /* seen from behind */
 }
 
+/* A square of side 2 about (0, y, 0) with shading normals 60 degrees off its own, towards x. up: does it look up? */
+static void add_tilted(pt_scene *s, double y, int up, int material)
+{
+    const double side = up ? 1 : -1;
+    const pt_vec3 p[4] = {v3(-1, y, -side), v3(-1, y, side), v3(1, y, side), v3(1, y, -side)}, n = v3(sqrt(0.75), 0.5 * side, 0);
+    const pt_vec3 normals[4] = {n, n, n, n};
+    const uint32_t index[6] = {0, 1, 2, 0, 2, 3};
+    pt_add_mesh(s, p, normals, NULL, 4, index, 2, material);
+}
+
+/* A lamp that lies behind a surface, but before its shading normals, lights nothing of it: exactly. */
+static void behind_surfaces(void)
+{
+    static const char *const methods[2] = {"path", "path-plain"};
+    int m, i;
+    for (m = 0; m < 2; m++) {
+        double sum = 0;
+        stage s;
+        pt_render_desc d;
+        pt_film film;
+        memset(&s, 0, sizeof s);
+        add_tilted(&s.scene, 0, 1, diffuse(&s.scene, 0.9, 0.9, 0.9));
+        pt_add_parallelogram(&s.scene, v3(1.5, -1, 1), v3(0, 0.8, 0), v3(0, 0, -2), material_of(&s.scene, pt_material_emitter(grey(9)), 9));
+        s.camera = camera_at(&HERE, 0, 3, 0.1, 0, 0, 0, 12);
+        commit(&s);
+        d = desc_of(&s, 12, 9, 64);
+        d.method = methods[m];
+        film = render(&s, &d, 2, NULL);
+        for (i = 0; i < 3 * 12 * 9; i++) sum += film.half[0][i] + film.half[1][i];
+        pt_check(sum == 0, label("a lamp behind a surface, %s", methods[m]), "it brings %g", sum);
+        pt_film_free(&film);
+        pt_scene_free(&s.scene);
+    }
+}
+
+/* The shading normals of a lamp do not matter to its light. */
+static void tilted_lamp(void)
+{
+    stage s;
+    pt_render_desc d;
+    picture a, b;
+    memset(&s, 0, sizeof s);
+    pt_add_parallelogram(&s.scene, v3(-2, 0, -2), v3(0, 0, 4), v3(4, 0, 0), diffuse(&s.scene, 0.8, 0.8, 0.8));
+    add_tilted(&s.scene, 0.5, 0, lamp(&s.scene, 1, 1, 1));
+    s.camera = camera_at(&HERE, 0.3, 0.45, 2, 0, 0, -0.5, 50);
+    commit(&s);
+    d = desc_of(&s, 9, 6, samples(60));
+    d.li.max_edges = 2;
+    a = pictures(&s, d, RENDERS, 910000, 2);
+    b = pictures(&s, d, RENDERS, 910500, 0);
+    pt_test_source("pti_path");
+    compare("a lamp with shading normals", &a, &b, within(0.03));
+    pt_scene_free(&s.scene);
+}
+
 /* Just inside of what it takes. */
 static void taken(void)
 {
@@ -1506,6 +1561,8 @@ static int lockstep(int argc, char **argv)
         PT_TEST_EXACT(refused);
         PT_TEST_EXACT(layers);
         PT_TEST_EXACT(taken);
+        PT_TEST_EXACT(behind_surfaces);
+        PT_TEST(tilted_lamp);
     } else {
         PT_TEST(two_rooms);
     }
