@@ -99,6 +99,7 @@ over_seeds() # DIRECTORY PASSED FAILED
         match($0, /  p [0-9.e+-]+  /) && match($0, /^(ok|FAIL) .* z +[-+][0-9.]+/) {
             z = substr($0, 1, RLENGTH)
             sub(/.* z +/, "", z)
+            z += 0 # a number from here on: text compares as text
             name = $0
             sub(/^(ok|FAIL) +/, "", name)
             sub(/ +n [0-9]+ +got .*/, "", name)
