@@ -114,7 +114,7 @@
        Decisions (does this ray meet this sphere, which side of this edge) are made in double from
        the pt_real input. No constant is tuned to the size of a scene: rays start at an offset that
        follows from the rounding error of their own origin ([PT-06]). Sums over samples are double.
-       Scenes of diffuse surfaces, mirrors, smooth glass and metal under at most 64 area lights are
+       Scenes of at most 64 materials, diffuse, mirror, smooth glass, metal, and 64 area lights are
        rendered by paths that walk in lockstep ([PT-11b]), in float; up to 64 primitives are decided in
        float as well, between primitives that are wider by the rounding of a hit. desc.no_lockstep asks
        for one path at a time; the two agree in the mean, not in their bits.
@@ -10748,7 +10748,7 @@ static unsigned pti_lock_vertex(pti_lock_work *w, pti_lane_row *row, unsigned ac
     pti_row3_set(row + PTI_ROW_BETA, beta);
     pti_row3_set(row + PTI_ROW_D, next);
     if (k->tree) pti_lock_depart(row, w->hits, pti_mw_bits(go));
-    else pti_row3_set(row + PTI_ROW_O, pti_w3_along(s.n, pti_lock_lift(k, &s, next), s.p));
+    else pti_row3_set(row + PTI_ROW_O, pti_w3_along(s.ng, pti_lock_lift(k, &s, next), s.p));
     row[PTI_ROW_DENSITY].f = density;
     row[PTI_ROW_EDGES].u = pti_uw_add(row[PTI_ROW_EDGES].u, pti_uw_set(1));
     return pti_mw_bits(go);
