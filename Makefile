@@ -12,6 +12,7 @@ CXX = c++
 endif
 # How many things `make test` does at a time; make's own -j wins.
 JOBS ?= 2
+AT_A_TIME = $(MAKE) --no-print-directory $(if $(findstring jobserver,$(MAKEFLAGS)),,-j$(JOBS))
 
 WARN = -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wdouble-promotion
 WARN_C = $(WARN) -Wstrict-prototypes -Wmissing-prototypes
@@ -31,7 +32,7 @@ SPP = 64
 SHARES = $(shell k=1; while [ $$k -le $(JOBS) ]; do echo $$k; k=$$((k + 1)); done)
 TESTS = $(patsubst tests/%.c,%,$(wildcard tests/test_*.c))
 # Those that take longest begin first, so that none is left alone at the end; scripts look at no numbers.
-LONGEST = $(filter test_transport test_lockstep_plain test_together test_oracles test_lockstep test_materials test_radiometry,$(TESTS))
+LONGEST = $(foreach t,test_transport test_lockstep_plain test_oracles test_lockstep test_together test_materials test_radiometry,$(filter $t,$(TESTS)))
 SCRIPTS = $(if $(SEED),,switches tool docs sections lessons)
 STARTED = $(LONGEST:%=build/test/%.log) $(SCRIPTS:%=build/test/check_%.log) $(TESTS:%=build/test/%.log)
 TEST_LOGS = $(SCRIPTS:%=build/test/check_%.log) $(TESTS:%=build/test/%.log)
@@ -159,7 +160,7 @@ exercises:
 	@$(COURSE) exercises $(N)
 
 lesson-programs:
-	@$(MAKE) --no-print-directory $(if $(findstring jobserver,$(MAKEFLAGS)),,-j$(JOBS)) $(CHOSEN:%=build/lessons/%)
+	+@$(AT_A_TIME) $(CHOSEN:%=build/lessons/%)
 
 build/lessons/%: lessons/%.c pathtracer.h build/flags
 	@mkdir -p build/lessons
@@ -168,10 +169,12 @@ build/lessons/%: lessons/%.c pathtracer.h build/flags
 # ---- tests ---------------------------------------------------------------------------------------
 
 # Builds and runs two at a time unless make was told how many; the counts are added up at the end. SEED=n runs
-# the statistical checks alone.
+# the statistical checks alone. What many wait for is built first: make keeps to the order of STARTED only then.
+SHARED = build/test/implementation.o $(if $(SEED),,build/render)
 test:
 	@rm -f build/test/*.log
-	@$(MAKE) --no-print-directory $(if $(findstring jobserver,$(MAKEFLAGS)),,-j$(JOBS)) -k test-logs || true
+	+@$(AT_A_TIME) -k $(SHARED) || true
+	+@$(AT_A_TIME) -k test-logs || true
 	@sh tests/run.sh sum $(TEST_LOGS)
 
 test-long:
