@@ -234,13 +234,14 @@ static void bad_material_ids(void)
 static void bad_spheres_and_lights(void)
 {
     static const double radius[6] = {0, -1, 2e18, (double)NAN, HUGE_VAL, -HUGE_VAL};
+    static const char *const said[6] = {"radius 0 ", "radius -1 ", "radius 2e", "radius nan ", "radius inf ", "radius -inf "};
     int i, band;
     for (i = 0; i < 6; i++) {
         pt_scene s = PT_SCENE_INIT;
         const int m = pt_add_material(&s, pt_material_diffuse(grey(0.5)));
         check_refused(label("sphere of radius %g", radius[i]), &s,
                       pt_add_sphere(&s, v3(0, 0, 0), (pt_real)radius[i], m), PT_ERROR_SCENE, "sphere 0",
-                      "radius");
+                      said[i]);
     }
     for (band = 0; band < 3; band++)
         for (i = 0; i < 4; i++) {
@@ -307,6 +308,27 @@ static void empty_meshes(void)
     pt_check(a == 0 && b == 1 && pt_commit(&s) == PT_OK && s.primitive_count == 0, "empty meshes",
              "%d, %d: %s", a, b, pt_scene_error(&s));
     pt_scene_free(&s);
+}
+
+/* The box of the scene holds each of its primitives, whichever of them reaches out. */
+static void bounds(void)
+{
+    static const double turn[3][3] = {{-4, 5, 0.5}, {7, -6, 2}, {1, 2, 9}};
+    int first, i;
+    for (first = 0; first < 3; first++) {
+        pt_scene s = PT_SCENE_INIT;
+        const int m = pt_add_material(&s, pt_material_diffuse(grey(0.5)));
+        for (i = 0; i < 3; i++) {
+            const double *const c = turn[(first + i) % 3];
+            pt_add_sphere(&s, v3(c[0], c[1], c[2]), (pt_real)0.5, m);
+        }
+        pt_check(pt_commit(&s) == PT_OK, "three spheres", "%s", pt_scene_error(&s));
+        pt_check(fabs((double)s.lo.x + 4.5) + fabs((double)s.lo.y + 6.5) + fabs((double)s.lo.z) < 1e-5 &&
+                     fabs((double)s.hi.x - 7.5) + fabs((double)s.hi.y - 5.5) + fabs((double)s.hi.z - 9.5) < 1e-5,
+                 label("box of three spheres from %d on", first), "(%g, %g, %g) to (%g, %g, %g)", (double)s.lo.x, (double)s.lo.y,
+                 (double)s.lo.z, (double)s.hi.x, (double)s.hi.y, (double)s.hi.z);
+        pt_scene_free(&s);
+    }
 }
 
 /* The first error is kept, whatever comes later. */
@@ -1081,15 +1103,17 @@ static void failing_memory(void)
     }
 }
 
-/* Out of memory in pt_commit leaves the scene whole: the next pt_commit succeeds. */
-static void commit_again(void)
+/* Out of memory in pt_commit leaves the scene whole: the next pt_commit succeeds. With 200 spheres more it has a tree. */
+static void committed_again(pt_tree tree, int more)
 {
     pt_scene s = PT_SCENE_INIT;
     pt_film first = PT_FILM_INIT, film = PT_FILM_INIT;
     pt_render_desc d = small_desc();
     long k;
-    pt_check(fill_scene(&s) == 0 && pt_commit(&s) == PT_OK && pt_render(&s, &d, &first, NULL) == PT_OK,
-             "scene to commit again", "fails");
+    s.tree = tree;
+    pt_check(fill_scene(&s) == 0, "scene to commit again", "cannot be filled");
+    for (k = 0; k < more; k++) pt_add_sphere(&s, v3((double)(k % 20) - 10, -3, (double)(k / 20)), (pt_real)0.2, 0);
+    pt_check(pt_commit(&s) == PT_OK && pt_render(&s, &d, &first, NULL) == PT_OK, "scene to commit again", "fails");
     for (k = 1; k < 100; k++) {
         pt_result result;
         pool_start(k, 0);
@@ -1109,7 +1133,14 @@ static void commit_again(void)
     pt_check(k > 5, "requests of pt_commit", "only %ld", k - 1);
     pt_film_free(&first);
     pt_scene_free(&s);
-    pt_check(pool.live == 0 && pool.strange == 0, "commit again, leaks", "%ld blocks", pool.live);
+    pt_check(pool.live == 0 && pool.strange == 0, label("commit again with tree %d and %d spheres, leaks", (int)tree, more), "%ld blocks", pool.live);
+}
+
+static void commit_again(void)
+{
+    committed_again(PT_TREE_DEFAULT, 0);
+    committed_again(PT_TREE_DEFAULT, 200);
+    committed_again(PT_TREE_BINARY, 200);
 }
 
 /* A film keeps its finished passes when memory ends in a later render. */
@@ -1253,6 +1284,7 @@ int main(int argc, char **argv)
     PT_TEST_EXACT(bad_spheres_and_lights);
     PT_TEST_EXACT(bad_meshes);
     PT_TEST_EXACT(empty_meshes);
+    PT_TEST_EXACT(bounds);
     PT_TEST_EXACT(first_error);
     PT_TEST_EXACT(result_strings);
     PT_TEST_EXACT(empty_scenes);
