@@ -51,7 +51,7 @@ static void add_things(pt_scene *s, double lift, int m)
     add_ball(s, &HERE, 0.7, 0.5, lift > 0 ? -0.5 : -0.9, 0.18, m); /* and one is half in the wall         */
 }
 
-/* by_tree: it asks its tree. */
+/* by_tree: it asks its tree; for that a speck is added, but where the scene has no choice as it is. */
 static stage furnace(int kind, double rho, int by_tree)
 {
     static const place places[FURNACES] = {{0, 1, 0, 0, 0},      {0, 1, 0.3, 0.2, 0.1}, {0.7, 1, 0, 0, 0},       {0.4, 1, 0, 0, 0}, {0.9, 1, 0.1, 0, -1},
@@ -71,7 +71,7 @@ static stage furnace(int kind, double rho, int by_tree)
     if (kind == SHELLS) add_ball(&s.scene, at, 0.1, 0, -0.2, 0.5, m);
     if (wedge) s.camera = camera_at(at, 0.9, 0.02, 0.5, 0, 0, 0.4, 0.1); /* it looks at the edge, on which a row of paths lands */
     if (kind == THINGS || kind == TOUCHING) add_things(&s.scene, kind == THINGS ? 0.05 : 0, m);
-    if (by_tree) add_speck(&s.scene, at);
+    if (by_tree && kind != THIN_WEDGE) add_speck(&s.scene, at);
     commit(&s);
     return s;
 }
