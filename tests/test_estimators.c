@@ -1192,7 +1192,7 @@ static void bookkeeping(void)
     calls = 0;
     pt_estimate_control(&p, exponential, 1.7, 0.5, &e); /* g is not f */
     pt_check(e.evaluations == 1000, "evaluations with a control variate", "%g", e.evaluations);
-    p.n = 1 << 18;
+    p.n = 1 << 21; /* more than a tick of a coarse clock */
     before = pt_cpu_seconds();
     pt_estimate_mean(&p, &e);
     used = pt_cpu_seconds() - before;
