@@ -1,4 +1,4 @@
-/* pathtracer.h - v0.5.0 - a path tracer in one C99 header: render by the rendering equation,
+/* pathtracer.h - v0.5.1 - a path tracer in one C99 header: render by the rendering equation,
    know how wrong the picture still is, and how long that took.      MIT-0 or public domain, see the end.
 
    Do this in exactly ONE C or C++ file, and include the header plainly everywhere else:
@@ -200,8 +200,8 @@
 
 #define PT_VERSION_MAJOR 0
 #define PT_VERSION_MINOR 5
-#define PT_VERSION_PATCH 0
-#define PT_VERSION_STRING "0.5.0"
+#define PT_VERSION_PATCH 1
+#define PT_VERSION_STRING "0.5.1"
 
 #if (defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ > 0) || \
      defined(__ASSOCIATIVE_MATH__) || defined(__RECIPROCAL_MATH__) || defined(_M_FP_FAST)) && \
@@ -9907,7 +9907,8 @@ static double pti_lock_write(pti_lockstep *k, const pt_scene *scene, const pti_l
 }
 
 /* Rough metal: the density of GGX facets at a half vector that is off by 3 u is off by 6 u / alpha of itself at most, where
-   u = 2^-24: 7e-4 from the alpha on that is taken. The squares of eta and k have room in a float. */
+   u = 2^-24: 7e-4 from the alpha on that is taken, and more where the way out grazes the facet, by the cosine there. The
+   squares of eta and k have room in a float. */
 static int pti_lock_takes(const pt_material *m)
 {
     const double most = fmax(pti_max3((double)m->eta.r, (double)m->eta.g, (double)m->eta.b), pti_max3((double)m->k.r, (double)m->k.g, (double)m->k.b));
@@ -9930,6 +9931,11 @@ static int pti_lock_bright(const pti_lockstep *k)
         if (!(k->light[PTI_LIT_DENSITY][j] > 0)) return 0; /* too dim for 24 bits */
     return 1;
 }
+
+#define PTI_LOCK_LEAST 1e-15 /* the square of a thousandth of it is a float with all its digits */
+
+/* Is the smallest thing large enough beside e, and for squares and densities of lengths in float? */
+static int pti_lock_large(const pti_lockstep *k, double smallest) { return smallest > 2048 * (double)k->e && smallest > PTI_LOCK_LEAST; }
 
 /* Makes a scene of any size ready, whose rays are asked of its tree. Lamps are few, and as large beside e as what a small scene is
    made of: their points are in float. */
@@ -9956,7 +9962,7 @@ static int pti_lockstep_make_tree(pti_lockstep *k, const pt_scene *scene)
         pti_lock_write_light(k, scene, &q, q.corners ? pti_lock_normal(&q) : pti_d(0, 0, 0), &sum);
     }
     k->e = (float)(17 * PTI_2_M24 * x);
-    return pti_lock_bright(k) && smallest > 2048 * (double)k->e && x < 1e15;
+    return pti_lock_bright(k) && pti_lock_large(k, smallest) && x < 1e15;
 }
 
 /* Makes a scene ready; 0: it is not one for lanes, or not seen from such a place. With u = 2^-24 and all coordinates at
@@ -9992,7 +9998,7 @@ static int pti_lockstep_make(pti_lockstep *k, const pt_scene *scene, pt_vec3 eye
         }
     }
     k->begin[PTI_LOCK_CLASSES] = n;
-    return pti_lock_bright(k) && smallest > 2048 * (double)k->e && smallest > 64 * (double)k->e_camera && (double)k->e > 1e-30 && x < 1e15;
+    return pti_lock_bright(k) && pti_lock_large(k, smallest) && smallest > 64 * (double)k->e_camera && x < 1e15;
 }
 
 /* --- rays --- */
@@ -10108,15 +10114,21 @@ PTI_INLINE8 pti_mw pti_lock_ask(const pti_lockstep *k, pti_w3 o, pti_w3 d, float
     return pti_lock_balls(k, o, d, best, met, how);
 }
 
-/* The nearest hits. */
+/* The nearest hits. Only lanes that need it take the careful answer: what a lane finds is its own matter. */
 static void pti_lock_nearest(const pti_lockstep *k, pti_w3 o, pti_w3 d, float e, pti_lock_best *best)
 {
+    pti_lock_best careful;
+    pti_mw doubtful;
     best->t = best->margin = best->key = pti_fw_set(PTI_LOCK_FAR);
     best->i = pti_fw_set(0);
+    careful = *best;
     pti_lock_ask(k, o, d, e, best, PTI_LOCK_NEAREST);
-    if (!pti_mw_bits(pti_fw_lt(best->margin, pti_fw_set(0)))) return;
-    best->t = best->margin = best->key;
-    pti_lock_ask(k, o, d, e, best, PTI_LOCK_CAREFUL);
+    doubtful = pti_fw_lt(best->margin, pti_fw_set(0));
+    if (!pti_mw_bits(doubtful)) return;
+    pti_lock_ask(k, o, d, e, &careful, PTI_LOCK_CAREFUL);
+    best->t = pti_fw_select(doubtful, careful.t, best->t);
+    best->i = pti_fw_select(doubtful, careful.i, best->i);
+    best->margin = pti_fw_select(doubtful, careful.margin, best->margin);
 }
 
 /* --- numbers --- */
@@ -10493,11 +10505,11 @@ PTI_INLINE8 pti_w3 pti_lock_glossy(const pti_lockstep *k, const pti_lock_surface
     h = pti_w3_normalize(h);
     c = pti_w3_dot(f->o, h);
     i = pti_w3_sub(pti_w3_scale(h, pti_fw_add(c, c)), f->o);
-    *above = pti_mw_and(pti_fw_lt(zero, c), pti_fw_lt(zero, i.z));
     *density = pti_lock_facet_density(f, h, masked_o);
     *weight = pti_w3_mul(*weight, pti_w3_scale(pti_lock_metal(k, s->i, c), pti_lock_shadowing(f, i, masked_o)));
-    next = pti_w3_along(f->s, i.x, pti_w3_along(f->t, i.y, pti_w3_scale(s->n, i.z)));
-    return pti_w3_normalize(next);
+    next = pti_w3_normalize(pti_w3_along(f->s, i.x, pti_w3_along(f->t, i.y, pti_w3_scale(s->n, i.z))));
+    *above = pti_mw_and(pti_mw_and(pti_fw_lt(zero, c), pti_fw_lt(zero, i.z)), pti_fw_lt(zero, pti_w3_dot(s->n, next)));
+    return next;
 }
 
 /* What is known of the lights chosen; one light is the same for all lanes. */
@@ -10523,12 +10535,17 @@ PTI_INLINE8 pti_fw pti_lock_ball_point(const pti_lockstep *k, pti_uw light, pti_
     const pti_fw middle = pti_fw_mul(d, pti_fw_sub(one, x)); /* of the chord */
     const pti_fw t = pti_fw_select(inside, pti_fw_add(middle, rest), pti_fw_sub(middle, rest));
     pti_w3 axis = pti_w3_scale(c, pti_fw_div(one, d)), s, v, w;
-    pti_fw cosine, sinus;
+    pti_fw cosine, sinus, across, along;
     axis = pti_w3_select(pti_fw_lt(zero, d), axis, pti_w3_make(zero, zero, one));
     pti_lock_frame(axis, &s, &v);
     pti_lock_turn(u->light1, &cosine, &sinus);
     *to = pti_w3_along(s, pti_fw_mul(sine, cosine), pti_w3_along(v, pti_fw_mul(sine, sinus), pti_w3_scale(axis, pti_fw_sub(one, x))));
-    w = pti_w3_normalize(pti_w3_sub(pti_w3_along(*to, t, p), centre));
+    /* from the centre: t (1 - x) - d along the axis, without what cancels there from afar */
+    across = pti_fw_mul(t, sine);
+    along = pti_fw_mul(rest, pti_fw_sub(one, x));
+    along = pti_fw_nmadd(d, sine2, pti_fw_select(inside, along, pti_fw_sub(zero, along)));
+    w = pti_w3_along(s, pti_fw_mul(across, cosine), pti_w3_along(v, pti_fw_mul(across, sinus), pti_w3_scale(axis, along)));
+    w = pti_w3_normalize(w);
     *q = pti_w3_along(w, pti_fw_add(r, pti_fw_select(inside, pti_fw_set(-2 * k->e), pti_fw_set(2 * k->e))), centre);
     return pti_fw_div(pti_lit(k, PTI_LIT_DENSITY, light), pti_fw_mul(pti_fw_set((float)(2 * PT_PI)), omc));
 }
@@ -10637,13 +10654,25 @@ PTI_INLINE8 pti_w3 pti_lock_specular(const pti_lockstep *k, const pti_lock_surfa
     return pti_w3_normalize(pti_w3_select(bent, refracted, mirrored));
 }
 
+/* Mirrors, smooth metal and glass take the geometric normal where the path comes from behind the shading normal, as
+   pti_specular_normal. */
+PTI_INLINE8 void pti_lock_smooth_normal(const pti_lockstep *k, pti_lock_surface *s)
+{
+    const pti_fw zero = pti_fw_set(0);
+    const pti_mw smooth = pti_mw_and(pti_fw_lt(zero, s->kind), pti_fw_le(pti_fw_gather(k->of[PTI_OF_ALPHA], s->i), zero)); /* diffuse is 0 */
+    const pti_mw behind = pti_mw_and(smooth, pti_fw_le(s->cosine, zero));
+    s->n = pti_w3_select(behind, s->ng, s->n);
+    s->cosine = pti_fw_select(behind, s->facing, s->cosine);
+}
+
 /* The next direction of every lane, its density (-1 of delta lobes), and weight multiplied; lanes of *go that it ends leave it. */
-PTI_INLINE8 pti_w3 pti_lock_scatter(const pti_lockstep *k, const pti_lock_surface *s, const pti_lock_facets *f, pti_w3 d, const pti_lock_numbers *u,
+PTI_INLINE8 pti_w3 pti_lock_scatter(const pti_lockstep *k, pti_lock_surface *s, const pti_lock_facets *f, pti_w3 d, const pti_lock_numbers *u,
                                    pti_w3 *weight, pti_fw *density, pti_lane_row *row, pti_mw *go)
 {
     const pti_mw all = pti_mw_of_bits(~0u), diffuse = k->specular ? pti_lock_is(s, PT_MATERIAL_DIFFUSE) : all;
     pti_fw cosine;
     pti_w3 next = pti_lock_cosine(s->n, u->bsdf0, u->bsdf1, &cosine);
+    if (k->shading && k->specular) pti_lock_smooth_normal(k, s);
     *density = pti_fw_mul(cosine, pti_fw_set((float)(1 / PT_PI)));
     if (k->specular && pti_mw_bits(diffuse) != pti_mw_bits(all)) {
         pti_w3 before = *weight;
@@ -14820,6 +14849,8 @@ PTDEF const pt_scene_entry *pt_scene_find(const char *name)
 /*
    VERSION HISTORY
 
+   0.5.1 (2026-11-22)  lockstep mended: mirrors and glass seen from behind their shading normals, pictures that hung on
+                       the size of tiles by a bit, rooms below 1e-15, small lamps far off.
    0.5.0 (2026-11-22)  paths walk in lockstep in scenes of any size, with metal, rough and smooth, and shading normals.
    0.4.0 (2026-11-22)  SIMD lanes (PT_NO_SIMD and PT_NO_INTRINSICS leave them out): a wide tree of eight children a node,
                        built on several threads, and lanes for small scenes find the same hits faster (scene.tree chooses);

@@ -1,7 +1,7 @@
 /* pt_floats.h: numbers for tests of lanes. Include after pt_test.h. */
 
 /* Numbers that are likely to meet where it hurts. */
-static float hostile_float(pt_pcg32 *rng)
+static inline float hostile_float(pt_pcg32 *rng)
 {
     static const float odd[12] = {0, -0.0f, 1, -1, 1e-38f, -1e-44f, 3.4e38f, -3.4e38f, HUGE_VALF, -HUGE_VALF, 1.5f, 0.1f};
     const unsigned k = pt_pcg32_next(rng) % 24;
@@ -11,4 +11,4 @@ static float hostile_float(pt_pcg32 *rng)
 }
 
 /* The same bits, or both are no numbers. */
-static int same_float(float a, float b) { return memcmp(&a, &b, sizeof a) == 0 || (a != a && b != b); }
+static inline int same_float(float a, float b) { return memcmp(&a, &b, sizeof a) == 0 || (a != a && b != b); }

@@ -1476,6 +1476,106 @@ static void behind_surfaces(void)
     }
 }
 
+/* Behind their shading normals mirrors, smooth metal and glass go by the geometric ones: the same picture as of paths one at a
+   time, and a mirror in a white furnace stays white. */
+static void behind_normals(void)
+{
+    int what;
+    for (what = 0; what < 3; what++) {
+        double sum[2] = {0, 0};
+        stage s;
+        int no, i;
+        memset(&s, 0, sizeof s);
+        add_tilted(&s.scene, 0, 1, pt_add_material(&s.scene, what == 0 ? pt_material_mirror(grey(1)) : what == 1 ? pt_material_conductor(grey(1.5), grey(4), 0) : pt_material_dielectric((pt_real)1.5)));
+        pt_add_sphere(&s.scene, v3(0, 0, 0), 50, lamp(&s.scene, 1, 1, 1));
+        s.camera = camera_at(&HERE, -3, 0.5, 0, 0, 0, 0, 10);
+        commit(&s);
+        for (no = 0; no < 2; no++) {
+            pt_render_desc d = desc_of(&s, 12, 9, 64);
+            pt_film film;
+            d.no_lockstep = no;
+            film = render(&s, &d, no ? 0 : 2, NULL);
+            for (i = 0; i < 3 * 12 * 9; i++) sum[no] += (film.half[0][i] + film.half[1][i]) / (64. * 3 * 12 * 9);
+            pt_film_free(&film);
+        }
+        pt_check(fabs(sum[0] - sum[1]) < (what == 2 ? 0.01 : 1e-5) && (what != 0 || fabs(sum[0] - 1) < 1e-5), label("behind shading normals, material %d", what),
+                 "%.7g, one at a time %.7g", sum[0], sum[1]);
+        pt_scene_free(&s.scene);
+    }
+}
+
+static stage boxed(const place *at)
+{
+    static const double corner[3] = {-0.5, 0.9, -0.5}, along[3] = {1, 0, 0}, across[3] = {0, 0, 1};
+    stage s;
+    int m;
+    memset(&s, 0, sizeof s);
+    m = diffuse(&s.scene, 0.6, 0.6, 0.6);
+    add_cube(&s.scene, PARALLELOGRAM, at, -1, 1, 0, m);
+    add_cube(&s.scene, PARALLELOGRAM, at, -0.45, 0.45, 1, m);
+    add_face(&s.scene, PARALLELOGRAM, at, corner, along, across, lamp(&s.scene, 5, 5, 5));
+    s.camera = camera_at(at, 0.1, 0.1, 0.95, 0, -0.1, -1, 65);
+    commit(&s);
+    return s;
+}
+
+/* What a path finds does not depend on those beside it: tiles of other sizes give the same bits, also where coordinates are
+   so large that one lane in thousands must be asked again. */
+static void alone(void)
+{
+    static const place far_off = {0, 6, 1150, 1150, 1150};
+    stage s = boxed(&far_off);
+    pt_render_desc d = desc_of(&s, 96, 96, 64);
+    pt_film film[2];
+    int k;
+    d.li.max_edges = 8;
+    for (k = 0; k < 2; k++) {
+        d.tile = k ? 5 : 16;
+        film[k] = render(&s, &d, 1, NULL);
+    }
+    pt_check(same_film(&film[0], &film[1]), "tiles of 16 and of 5", "other bits");
+    pt_film_free(&film[0]);
+    pt_film_free(&film[1]);
+    pt_scene_free(&s.scene);
+}
+
+/* A room of 1e-20, whose squares no float holds, is left to paths one at a time. */
+static void tiny(void)
+{
+    static const place at = {0, 1e-20, 0, 0, 0};
+    stage s = boxed(&at);
+    const pt_render_desc d = desc_of(&s, 12, 9, 8);
+    pt_film film = render(&s, &d, 0, NULL);
+    pt_check(film.half[0][0] > 0, "a room of 1e-20", "is black");
+    pt_film_free(&film);
+    pt_scene_free(&s.scene);
+}
+
+/* A lamp of radius 1, 10^7 from the wall that it lights, does not shade itself. */
+static void far_lamp(void)
+{
+    const double far_off = 1e7;
+    double sum[2] = {0, 0};
+    stage s;
+    int no, i;
+    memset(&s, 0, sizeof s);
+    pt_add_sphere(&s.scene, v3(0, 0, 0), 1, lamp(&s.scene, 1, 1, 1));
+    pt_add_parallelogram(&s.scene, v3(-far_off, -far_off, -far_off), v3(2 * far_off, 0, 0), v3(0, 2 * far_off, 0), diffuse(&s.scene, 0.8, 0.8, 0.8));
+    s.camera = camera_at(&HERE, 0, 0.01 * far_off, -0.2 * far_off, 0, 0, -far_off, 40);
+    commit(&s);
+    for (no = 0; no < 2; no++) {
+        pt_render_desc d = desc_of(&s, 12, 9, 64);
+        pt_film film;
+        d.li.max_edges = 2;
+        d.no_lockstep = no;
+        film = render(&s, &d, no ? 0 : 2, NULL);
+        for (i = 0; i < 3 * 12 * 9; i++) sum[no] += film.half[0][i] + film.half[1][i];
+        pt_film_free(&film);
+    }
+    pt_check(sum[1] > 0 && fabs(sum[0] / sum[1] - 1) < 1e-3, "a small lamp far off", "%g, one at a time %g", sum[0], sum[1]);
+    pt_scene_free(&s.scene);
+}
+
 /* The shading normals of a lamp do not matter to its light. */
 static void tilted_lamp(void)
 {
@@ -1562,6 +1662,10 @@ static int lockstep(int argc, char **argv)
         PT_TEST_EXACT(layers);
         PT_TEST_EXACT(taken);
         PT_TEST_EXACT(behind_surfaces);
+        PT_TEST_EXACT(behind_normals);
+        PT_TEST_EXACT(alone);
+        PT_TEST_EXACT(tiny);
+        PT_TEST_EXACT(far_lamp);
         PT_TEST(tilted_lamp);
     } else {
         PT_TEST(two_rooms);
