@@ -916,11 +916,12 @@ typedef enum pt_tree {
 /* A tree of eight children a node over all primitives of a scene; made and freed with it. */
 typedef struct pt_wide {
     void *memory;
-    unsigned char *arena;    /* nodes and leaves, within memory                                            */
+    unsigned char *arena;    /* what stands apart, then nodes and leaves, within memory                    */
     size_t bytes;            /* of the arena; 0 = no tree                                                  */
     uint32_t root;
     uint32_t triangles;      /* primitives below this number are triangles                                 */
-    int plane_blocks, sphere_blocks; /* a small scene has these instead of a tree                          */
+    int tree;                /* 0: no nodes and leaves, as all primitives stand apart                      */
+    int plane_blocks, sphere_blocks; /* of what stands apart: the walls of a room, all of a small scene    */
     float extent;            /* the largest coordinate, in magnitude                                       */
 } pt_wide;
 #endif
@@ -4812,10 +4813,166 @@ typedef struct pti_sphere8 {
     uint32_t id[8];
 } pti_sphere8;
 
+/* Memory from a multiple of 64 bytes on; if it is much, of 2 MiB, the size of a page of which few are enough. *memory is what
+   is to be freed. */
+static void *pti_alloc_lines(size_t bytes, void **memory, void *user)
+{
+    const size_t page = (size_t)1 << 21, step = bytes < 2 * page ? 64 : page;
+    unsigned char *lines;
+    *memory = bytes > SIZE_MAX - step ? NULL : pti_alloc(bytes + step, 1, user);
+    if (!*memory) return NULL;
+    lines = (unsigned char *)(((uintptr_t)*memory + step - 1) / step * step);
+#ifdef MADV_HUGEPAGE
+    if (step == page) madvise(lines, bytes / page * page, MADV_HUGEPAGE);
+#endif
+    return lines;
+}
+
+/* WHAT STANDS APART. Up to 64 primitives need no tree: every lane says where its primitive may begin, no later than the hit, and
+   primitives are tested by [PT-06] in that order, until what is left begins behind the nearest hit. That is one test for most
+   rays, and no branch that depends on the ray but the last. In larger scenes the walls, which nearly every ray asks anyway and
+   whose boxes would blow up those of a tree, stand apart, too: they are asked first and bound how far the tree is walked.
+
+   Memory is no matter here, so a lane keeps what saves time: the plane of its primitive and the weights of a point in it,
+   as linear functions of the point. Two triangles in a row that make a parallelogram share a lane, as the sides of rooms and
+   boxes mostly do. */
+#define PTI_SMALL 64        /* lanes, of planes, then of spheres                                           */
+
+/* The plane n.p + n3 = 0; weights u = U.p + U3, v = V.p + V3 and w = 1 - u - v of a point p in it, for a parallelogram
+   w = 1 - max(u, v). */
+typedef struct pti_plane8 {
+    float n[4][8], u[4][8], v[4][8];
+    float steep[8];         /* G: the 1-norms of U, V and the gradient of w are no larger                  */
+    float both[8];          /* 1 for a parallelogram, else 0                                               */
+} pti_plane8;
+
+/* What to test: a primitive and, of a flat one, the corners of it or of a half. */
+typedef struct pti_tested {
+    pt_vec3 corner[3];
+    int id, half;           /* 1, 2: of a parallelogram                                                    */
+    uint32_t unused[5];
+} pti_tested;
+
+/* tested[PTI_SMALL + i]: the half of lane i where v > u. */
+typedef struct pti_small {
+    pti_plane8 planes[PTI_SMALL / 8];
+    pti_sphere8 spheres[PTI_SMALL / 8];
+    pti_lanes tag[PTI_SMALL / 4]; /* bits 0, 1, 2, ...: numbers of what is tested                           */
+    pti_tested tested[2 * PTI_SMALL];
+} pti_small;
+
+/* Sphere `id` in lane i; 0 there: a lane without one. */
+static void pti_write_sphere(const pt_scene *scene, pti_sphere8 *out, uint32_t i, uint32_t id, int there)
+{
+    const pt_sphere *s = &scene->spheres[scene->primitives[id].index];
+    out->id[i] = id;
+    out->centre[0][i] = there ? s->centre.x : 1e30f;
+    out->centre[1][i] = s->centre.y;
+    out->centre[2][i] = s->centre.z;
+    out->radius[i] = s->radius;
+}
+
+/* Are triangles a and b halves of a parallelogram, up to the rounding of its corners? Then c are its corners, the diagonal
+   from the first, and a is the half of its first edge. */
+static int pti_is_parallelogram(const pt_vec3 *a, const pt_vec3 *b, double extent, pt_vec3 *c)
+{
+    int i, j;
+    for (i = 0; i < 9; i++) {
+        const pt_vec3 p = a[i % 3], e = a[(i + 1) % 3], q = a[(i + 2) % 3], f = b[(i / 3 + 2) % 3];
+        const pti_d3 off = pti_d_sub(pti_d_between(p, e), pti_d_between(f, q));
+        j = i / 3;
+        if (memcmp(&p, &b[j], sizeof p) || memcmp(&q, &b[(j + 1) % 3], sizeof q)) continue;
+        if (pti_max3(off.x, off.y, off.z) > 2 * (double)PTI_U * extent) continue;
+        c[0] = p;
+        c[1] = e;
+        c[2] = q;
+        c[3] = f;
+        return 1;
+    }
+    return 0;
+}
+
+/* Lane i; 0 there: one without anything, where u = -10^30. The normal of a sliver is known to some 2^-51 |e1| |e2| only: where
+   it is not much longer, and where numbers overflow, NaN leaves the answer to the test in double. */
+static void pti_write_plane(pti_plane8 *out, uint32_t i, const pt_vec3 *c, int corners, int there)
+{
+    const pti_d3 o = pti_d_from(c[0]), e1 = pti_d_between(c[0], c[1]), e2 = pti_d_between(c[0], c[corners - 1]);
+    const pti_d3 n = pti_d_cross(e1, e2), u = pti_d_cross(e2, n), v = pti_d_cross(n, e1);
+    const double longest = pti_max3(n.x, n.y, n.z), square = pti_d_dot(n, n);
+    const double known = longest > 1e-6 * pti_max3(e1.x, e1.y, e1.z) * pti_max3(e2.x, e2.y, e2.z) ? 1 : HUGE_VAL - HUGE_VAL;
+    const double row[3][4] = {{n.x, n.y, n.z, -pti_d_dot(n, o)}, {u.x, u.y, u.z, -pti_d_dot(u, o)}, {v.x, v.y, v.z, -pti_d_dot(v, o)}};
+    double steep[3] = {0, 0, 0};
+    int k;
+    for (k = 0; k < 4; k++) {
+        out->n[k][i] = (float)(row[0][k] / longest * known);
+        out->u[k][i] = there ? (float)(row[1][k] / square) : k < 3 ? 0 : -1e30f;
+        out->v[k][i] = there ? (float)(row[2][k] / square) : 0;
+        if (k == 3) continue;
+        steep[0] += fabs(row[1][k] / square);
+        steep[1] += fabs(row[2][k] / square);
+        steep[2] += fabs((row[1][k] + row[2][k]) / square);
+    }
+    out->steep[i] = there ? (float)(pti_max3(steep[0], steep[1], steep[2]) * (1 + 4 * (double)PTI_U)) : 0;
+    out->both[i] = corners == 4;
+}
+
+/* Lane `lane` from entry i of a list of `count` flat primitives on; how many it takes. */
+static uint32_t pti_write_flat(const pt_scene *scene, pti_small *out, uint32_t lane, const uint32_t *list, uint32_t i, uint32_t count)
+{
+    pti_tested *a = &out->tested[lane], *b = &out->tested[PTI_SMALL + lane];
+    pti_plane8 *plane = &out->planes[lane / 8];
+    const int there = i < count;
+    pt_vec3 c[4], d[4], all[4];
+    int corners;
+    a->id = b->id = (int)list[there ? i : count - 1];
+    corners = pti_corners(scene, &scene->primitives[a->id], c);
+    a->half = corners == 4 ? 1 : 0;
+    b->half = 2 * a->half;
+    memcpy(a->corner, c, sizeof a->corner);
+    memcpy(b->corner, c, sizeof b->corner);
+    if (b->half) memcpy(b->corner + 1, c + 2, 2 * sizeof *c);
+    if (corners == 3 && i + 1 < count && pti_corners(scene, &scene->primitives[list[i + 1]], d) == 3 &&
+        pti_is_parallelogram(c, d, (double)scene->wide.extent, all)) {
+        b->id = (int)list[i + 1];
+        memcpy(b->corner, d, sizeof b->corner);
+        pti_write_plane(plane, lane % 8, all, 4, 1);
+        return 2;
+    }
+    pti_write_plane(plane, lane % 8, c, corners, there);
+    return 1;
+}
+
+/* Planes of a list of flat primitives, then all spheres from primitive `sphere` up to `end`. */
+static void pti_write_apart(const pt_scene *scene, pt_wide *wide, pti_small *out, const uint32_t *list, uint32_t flats, uint32_t sphere, uint32_t end)
+{
+    uint32_t i, lane = 0;
+    for (i = 0; i < 2 * PTI_SMALL; i++) out->tag[i / 8].bits[i % 8] = i;
+    for (i = 0; i < flats || lane % 8 > 0; lane++) i += pti_write_flat(scene, out, lane, list, i, flats);
+    wide->plane_blocks = (int)(lane / 8);
+    for (i = 0; sphere + i < end || i % 8 > 0; i++, lane++) {
+        const uint32_t id = sphere + i < end ? sphere + i : end - 1;
+        out->tested[lane].id = out->tested[PTI_SMALL + lane].id = (int)id;
+        pti_write_sphere(scene, &out->spheres[i / 8], i % 8, id, sphere + i < end);
+    }
+    wide->sphere_blocks = (int)(i / 8);
+}
+
+/* All of a small scene, the first `flats` of which are flat. 0 = no memory. */
+static int pti_build_small(const pt_scene *scene, pt_wide *wide, uint32_t flats)
+{
+    uint32_t list[PTI_SMALL], i;
+    wide->arena = (unsigned char *)pti_alloc_lines(sizeof(pti_small), &wide->memory, scene->alloc_user);
+    if (!wide->arena) return 0;
+    wide->bytes = sizeof(pti_small);
+    for (i = 0; i < flats; i++) list[i] = i;
+    pti_write_apart(scene, wide, (pti_small *)(void *)wide->arena, list, flats, flats, scene->primitive_count);
+    return 1;
+}
+
 /* BUILDING. First a binary tree as in [PT-07], by the surface area heuristic with bins; but eight triangles cost what one
-   does, so a side costs its area times ceil(n / 8), and eight are a leaf, but for large ones: walls are better off apart. Then, of all ways in which nodes of up to eight
-   children can be cut from that tree, the one whose nodes and leaves have the least area together: with c(n, k) the
-   least cost of subtree n in at most k slots of a parent [Yli17],
+   does, so a side costs its area times ceil(n / 8), and eight are a leaf. Then, of all ways in which nodes of up to eight
+   children can be cut from that tree, the one whose nodes and leaves have the least area together: with c(n, k) the least cost
+   of subtree n in at most k slots of a parent [Yli17],
 
        c(n, 1) = A(n) for a leaf,    A(n) + min_j c(left, j) + c(right, 8 - j)    for a node of its own,
        c(n, k) = min( c(n, k-1), min_j c(left, j) + c(right, k-j) ).
@@ -4825,7 +4982,9 @@ typedef struct pti_sphere8 {
 #define PTI_WIDE_BINS 16
 #define PTI_PIECES 256
 #define PTI_WIDE_DEPTH 32   /* deeper down lists are halved, and end within 28 levels                      */
-#define PTI_WALL 0.1f       /* a leaf of more than a 30th of the surface of a cube around the scene is cut where that pays */
+#define PTI_SIDE 4          /* no side of a plane has fewer boxes                                          */
+#define PTI_APART 0.03f     /* flat primitives whose box has a 100th of the surface of a cube around the scene stand apart, */
+#define PTI_WALLS 32        /* unless there are more of them                                               */
 #define PTI_FEW 33          /* for lists that are shorter, half of the bins do                             */
 
 /* Some boxes joined, and {-least, greatest} of twice their centres. */
@@ -4854,8 +5013,10 @@ typedef struct pti_wide_builder {
     unsigned char *arena;   /* NULL while bytes are counted                                                */
     size_t used;            /* bytes of it                                                                 */
     pti_counter next;       /* node                                                                        */
-    float wall;             /* half of the surface of a wall                                               */
+    float apart;            /* half of the surface of what stands apart                                    */
     uint32_t triangles, flats; /* lanes below these hold triangles, triangles and halves                   */
+    uint32_t lanes, flat_lanes; /* in the tree, and how many of them hold what is flat                     */
+    uint32_t walls, list[PTI_WALLS]; /* primitives that stand apart                                        */
     uint32_t piece_size;
     int piece_count;
     pti_piece pieces[PTI_PIECES];
@@ -4880,8 +5041,8 @@ typedef struct pti_wide_bins {
     uint32_t count[PTI_WIDE_BINS];
 } pti_wide_bins;
 
-/* The best plane between `count` bins of an axis, if it is better than *best; `few` boxes at least on each side. */
-static void pti_sweep_blocks(const pti_wide_bins *bins, int count, uint32_t few, pti_parting p, pti_parting *best)
+/* The best plane between `count` bins of an axis, if it is better than *best. */
+static void pti_sweep_blocks(const pti_wide_bins *bins, int count, pti_parting p, pti_parting *best)
 {
     float right[PTI_WIDE_BINS];
     pti_lanes box;
@@ -4891,13 +5052,13 @@ static void pti_sweep_blocks(const pti_wide_bins *bins, int count, uint32_t few,
     for (i = count - 1; i > 0; i--) {
         box.f = pti_f8_max(box.f, bins->box[i].f);
         n += bins->count[i];
-        right[i] = n >= few ? pti_box_area(box.v) * (float)((n + 7) / 8) : HUGE_VALF;
+        right[i] = n >= PTI_SIDE ? pti_box_area(box.v) * (float)((n + 7) / 8) : HUGE_VALF;
     }
     box.f = pti_f8_set(-HUGE_VALF);
     for (n = 0, i = 1; i < count; i++) {
         box.f = pti_f8_max(box.f, bins->box[i - 1].f);
         n += bins->count[i - 1];
-        if (n < few) continue;
+        if (n < PTI_SIDE) continue;
         p.cost = pti_box_area(box.v) * (float)((n + 7) / 8) + right[i];
         p.plane = (float)i;
         if (p.cost < best->cost) *best = p;
@@ -4905,7 +5066,7 @@ static void pti_sweep_blocks(const pti_wide_bins *bins, int count, uint32_t few,
 }
 
 /* Improves on *best, a halving of infinite cost, if the centres differ. */
-static void pti_find_parting(const pti_wide_builder *b, uint32_t begin, uint32_t end, const float *centres, uint32_t few, pti_parting *best)
+static void pti_find_parting(const pti_wide_builder *b, uint32_t begin, uint32_t end, const float *centres, pti_parting *best)
 {
     const int count = end - begin < PTI_FEW ? PTI_WIDE_BINS / 2 : PTI_WIDE_BINS;
     pti_wide_bins bins[3];
@@ -4939,7 +5100,7 @@ static void pti_find_parting(const pti_wide_builder *b, uint32_t begin, uint32_t
         }
     }
     for (k = 0; k < 3; k++)
-        if (p[k].scale > 0) pti_sweep_blocks(&bins[k], count, few, p[k], best);
+        if (p[k].scale > 0) pti_sweep_blocks(&bins[k], count, p[k], best);
 }
 
 /* Moves what goes left to the front, without branches, and joins both sides; returns the first of the right. */
@@ -4986,14 +5147,14 @@ static void pti_collapse(const pti_wide_builder *b, pti_binary *n)
 }
 
 /* Node n, whose range is known, and all below it. pieces: what is small is left for later. The root parts flat primitives
-   from spheres. Sides of less than four boxes are cut off in the upper 8 levels only: so half as many nodes as boxes,
-   and 514, are enough. */
+   from spheres. No n boxes make more than 5 n / 18 leaves: four and more do on each side of a plane, and where none is found,
+   18 are 16, of four leaves, and 2. */
 static void pti_build_binary(pti_wide_builder *b, uint32_t n, const pti_joined *all, int depth, int pieces)
 {
     pti_binary *node = &b->nodes[n];
     const uint32_t begin = node->first, end = begin + node->count;
     const float area = pti_box_area(all->box.v);
-    const int mixed = n == 0 && b->flats > 0 && b->flats < end, few = node->count <= 8 && !mixed;
+    const int mixed = n == 0 && b->flat_lanes > 0 && b->flat_lanes < end, leaf = node->count <= 8 && !mixed;
     pti_parting p = {-1, 0, 0, 0, HUGE_VALF, (node->count / 2 + 7) / 8 * 8};
     pti_joined side[2];
     uint32_t middle, k;
@@ -5003,15 +5164,14 @@ static void pti_build_binary(pti_wide_builder *b, uint32_t n, const pti_joined *
     }
     node->child = 0;
     for (k = 0; k < 7; k++) node->cost[k] = area;
-    if (few && (depth >= 8 || area < b->wall)) return;
-    if (pieces && n > 0 && !few && node->count <= b->piece_size && b->piece_count < PTI_PIECES) {
+    if (leaf) return;
+    if (pieces && n > 0 && node->count <= b->piece_size && b->piece_count < PTI_PIECES) {
         const pti_piece piece = {n, depth, *all};
         b->pieces[b->piece_count++] = piece;
         return;
     }
-    if (mixed) p.middle = b->flats;
-    else if (depth < PTI_WIDE_DEPTH) pti_find_parting(b, begin, end, all->centres.v, depth < 8 ? 1 : 4, &p);
-    if (few && !(p.cost < area)) return;
+    if (mixed) p.middle = b->flat_lanes;
+    else if (depth < PTI_WIDE_DEPTH) pti_find_parting(b, begin, end, all->centres.v, &p);
     middle = pti_part(b, begin, end, &p, side);
     node->child = (uint32_t)PTI_ADD(&b->next, 2);
     for (k = 0; k < 2; k++) {
@@ -5076,17 +5236,6 @@ static void pti_write_triangles(const pti_wide_builder *b, const pti_binary *lea
     }
 }
 
-/* Sphere `id` in lane i; 0 there: a lane without one. */
-static void pti_write_sphere(const pt_scene *scene, pti_sphere8 *out, uint32_t i, uint32_t id, int there)
-{
-    const pt_sphere *s = &scene->spheres[scene->primitives[id].index];
-    out->id[i] = id;
-    out->centre[0][i] = there ? s->centre.x : 1e30f;
-    out->centre[1][i] = s->centre.y;
-    out->centre[2][i] = s->centre.z;
-    out->radius[i] = s->radius;
-}
-
 static uint32_t pti_write_leaf(pti_wide_builder *b, const pti_binary *leaf)
 {
     const uint32_t reference = (uint32_t)(b->used / 64) << 3;
@@ -5130,17 +5279,30 @@ static uint32_t pti_write_tree(pti_wide_builder *b, uint32_t n)
     return reference;
 }
 
-static pti_joined pti_fill_boxes(const pti_wide_builder *b, uint32_t lanes)
+/* The boxes of `lanes` lanes, but for walls that stand apart, and all of them joined. */
+static pti_joined pti_fill_boxes(pti_wide_builder *b, uint32_t lanes)
 {
     pti_joined all;
     uint32_t i;
     all.box.f = all.centres.f = pti_f8_set(-HUGE_VALF);
+    b->lanes = b->flat_lanes = b->walls = 0;
     for (i = 0; i < lanes; i++) {
-        pti_lanes *box = &b->boxes[i];
+        const uint32_t id = pti_lane_primitive(b, i);
+        pti_lanes *box = &b->boxes[b->lanes];
         pt_vec3 lo, hi;
-        pti_primitive_box(b->scene, &b->scene->primitives[pti_lane_primitive(b, i)], &lo, &hi);
+        pti_primitive_box(b->scene, &b->scene->primitives[id], &lo, &hi);
         box->v[0] = -lo.x; box->v[1] = -lo.y; box->v[2] = -lo.z; box->bits[3] = i;
         box->v[4] = hi.x; box->v[5] = hi.y; box->v[6] = hi.z; box->v[7] = 0;
+        if (i < b->flats && pti_box_area(box->v) > b->apart) {
+            if (b->walls == PTI_WALLS) { /* these are too many to be asked by every ray */
+                b->apart = HUGE_VALF;
+                return pti_fill_boxes(b, lanes);
+            }
+            if (b->walls == 0 || b->list[b->walls - 1] != id) b->list[b->walls++] = id; /* else its second half */
+            continue;
+        }
+        b->lanes++;
+        b->flat_lanes += i < b->flats;
         all.box.f = pti_f8_max(box->f, all.box.f);
         all.centres.f = pti_f8_max(pti_f8_sub(box->f, pti_f8_swap(box->f)), all.centres.f);
     }
@@ -5151,16 +5313,16 @@ static pti_joined pti_fill_boxes(const pti_wide_builder *b, uint32_t lanes)
 static void pti_build_nodes_of(pti_wide_builder *b, uint32_t lanes)
 {
     const pt_scene *scene = b->scene;
-    const pti_joined all = pti_fill_boxes(b, lanes);
-    float widest = 1e-30f;
+    const pt_vec3 size = pt_v3_sub(scene->hi, scene->lo);
+    const float widest = (float)fmax(pti_max3((double)size.x, (double)size.y, (double)size.z), 1e-30);
+    pti_joined all;
     pti_counter n;
-    int k;
-    for (k = 0; k < 3; k++) widest = all.box.v[4 + k] + all.box.v[k] > widest ? all.box.v[4 + k] + all.box.v[k] : widest;
-    b->wall = PTI_WALL * widest * widest;
+    b->apart = PTI_APART * widest * widest;
+    all = pti_fill_boxes(b, lanes);
     b->piece_size = lanes / 64 > 4096 ? lanes / 64 : 4096;
     b->next = 1;
     b->nodes[0].first = 0;
-    b->nodes[0].count = lanes;
+    b->nodes[0].count = b->lanes;
     pti_build_binary(b, 0, &all, 0, 1);
     n = b->next;
     if (scene->parallel) scene->parallel(scene->parallel_user, b->piece_count, pti_build_piece, b);
@@ -5169,27 +5331,13 @@ static void pti_build_nodes_of(pti_wide_builder *b, uint32_t lanes)
         if (b->nodes[n].child) pti_collapse(b, &b->nodes[n]);
 }
 
-/* Memory from a multiple of 64 bytes on; if it is much, of 2 MiB, the size of a page of which few are enough. *memory is what
-   is to be freed. */
-static void *pti_alloc_lines(size_t bytes, void **memory, void *user)
-{
-    const size_t page = (size_t)1 << 21, step = bytes < 2 * page ? 64 : page;
-    unsigned char *lines;
-    *memory = bytes > SIZE_MAX - step ? NULL : pti_alloc(bytes + step, 1, user);
-    if (!*memory) return NULL;
-    lines = (unsigned char *)(((uintptr_t)*memory + step - 1) / step * step);
-#ifdef MADV_HUGEPAGE
-    if (step == page) madvise(lines, bytes / page * page, MADV_HUGEPAGE);
-#endif
-    return lines;
-}
-
 /* Over primitives of which `triangles` are triangles, then halves / 2 parallelograms, the rest spheres. 0 = no memory. */
 static int pti_build_wide_tree(const pt_scene *scene, pt_wide *wide, uint32_t triangles, uint32_t halves)
 {
-    const uint32_t lanes = scene->primitive_count + halves / 2, nodes = lanes / 2 + 514;
+    const uint32_t lanes = scene->primitive_count + halves / 2, nodes = lanes / 9 * 5 + 16;
     void *user = scene->alloc_user, *memory;
     pti_wide_builder b;
+    size_t apart = 0;
     int ok;
     memset(&b, 0, sizeof b);
     b.nodes = (pti_binary *)pti_alloc_lines(((size_t)lanes + 2 * (size_t)nodes) * sizeof(pti_lanes), &memory, user);
@@ -5200,17 +5348,36 @@ static int pti_build_wide_tree(const pt_scene *scene, pt_wide *wide, uint32_t tr
         b.flats = triangles + halves;
         b.boxes = (pti_lanes *)(void *)(b.nodes + nodes);
         pti_build_nodes_of(&b, lanes);
+        b.used = apart = b.walls > 0 ? sizeof(pti_small) : 0;
         pti_write_tree(&b, 0);
         if (b.used / 64 < (size_t)1 << 29) b.arena = wide->arena = (unsigned char *)pti_alloc_lines(b.used, &wide->memory, user);
         ok = b.arena != NULL;
     }
     if (ok) {
         wide->bytes = b.used;
-        b.used = 0;
+        wide->tree = 1;
+        if (b.walls > 0) pti_write_apart(scene, wide, (pti_small *)(void *)b.arena, b.list, b.walls, 0, 0);
+        b.used = apart;
         wide->root = pti_write_tree(&b, 0);
     }
     pti_free(memory, user);
     return ok;
+}
+
+/* What pt_commit calls: 1, or 0 without memory, or -1 if there are more than 2^29 lanes, or numbers too small or large. */
+static int pti_build_wide(const pt_scene *scene, pt_wide *wide)
+{
+    const double low = pti_max3((double)scene->lo.x, (double)scene->lo.y, (double)scene->lo.z);
+    const double high = pti_max3((double)scene->hi.x, (double)scene->hi.y, (double)scene->hi.z);
+    uint32_t count[3] = {0, 0, 0}, flats, i;
+    memset(wide, 0, sizeof *wide);
+    wide->extent = (float)fmax(low, high);
+    for (i = 0; i < scene->primitive_count; i++) count[scene->primitives[i].shape]++;
+    flats = count[PT_SHAPE_TRIANGLE] + count[PT_SHAPE_PARALLELOGRAM];
+    if ((size_t)scene->primitive_count + count[PT_SHAPE_PARALLELOGRAM] > (size_t)1 << 29) return -1;
+    if (!(wide->extent > PTI_LEAST_SPAN / 256 && wide->extent < PTI_MOST_SPAN / 2)) return -1;
+    if ((flats + 7) / 8 + (count[PT_SHAPE_SPHERE] + 7) / 8 <= PTI_SMALL / 8) return pti_build_small(scene, wide, flats);
+    return pti_build_wide_tree(scene, wide, count[PT_SHAPE_TRIANGLE], 2 * count[PT_SHAPE_PARALLELOGRAM]);
 }
 
 /* A RAY for lanes, with what bounds their errors. */
@@ -5530,13 +5697,13 @@ PTI_INLINE int pti_test_leaf(const pt_scene *scene, uint32_t leaf, const pti_ray
 }
 
 /* Walks the tree, near children first; any = 1 stops at the first hit. */
-PTI_INLINE int pti_traverse_wide(const pt_scene *scene, const pti_ray *r, const pti_ray8 *w, pti_best *best, int any)
+PTI_INLINE int pti_traverse_wide(const pt_scene *scene, const pti_ray *r, pti_ray8 *w, float limit, pti_best *best, int any)
 {
     const pt_wide *tree = &scene->wide;
     pti_waiting stack[PTI_WAITING];
     uint32_t at = tree->root, limit_bits;
-    float limit = pti_ray8_limit(w, best->t);
     int top = 0, found = 0;
+    pti_ray8_for_tree(w, r);
     memcpy(&limit_bits, &limit, sizeof limit_bits);
     for (;;) {
         if ((at & 7) == PTI_NODE) {
@@ -5564,145 +5731,6 @@ PTI_INLINE int pti_traverse_wide(const pt_scene *scene, const pti_ray *r, const 
         } while (!any && stack[top] >> 32 > limit_bits);
         at = (uint32_t)stack[top];
     }
-}
-
-/* SMALL SCENES. Up to 64 primitives need no tree: every lane says where its primitive may begin, no later than the hit, and
-   primitives are tested by [PT-06] in that order, until what is left begins behind the nearest hit. That is one test for most
-   rays, and no branch that depends on the ray but the last.
-
-   Memory is no matter here, so a lane keeps what saves time: the plane of its primitive and the weights of a point in it,
-   as linear functions of the point. Two triangles in a row that make a parallelogram share a lane, as the sides of rooms and
-   boxes mostly do. */
-#define PTI_SMALL 64        /* lanes, of planes, then of spheres                                           */
-
-/* The plane n.p + n3 = 0; weights u = U.p + U3, v = V.p + V3 and w = 1 - u - v of a point p in it, for a parallelogram
-   w = 1 - max(u, v). */
-typedef struct pti_plane8 {
-    float n[4][8], u[4][8], v[4][8];
-    float steep[8];         /* G: the 1-norms of U, V and the gradient of w are no larger                  */
-    float both[8];          /* 1 for a parallelogram, else 0                                               */
-} pti_plane8;
-
-/* What to test: a primitive and, of a flat one, the corners of it or of a half. */
-typedef struct pti_tested {
-    pt_vec3 corner[3];
-    int id, half;           /* 1, 2: of a parallelogram                                                    */
-    uint32_t unused[5];
-} pti_tested;
-
-/* tested[PTI_SMALL + i]: the half of lane i where v > u. */
-typedef struct pti_small {
-    pti_plane8 planes[PTI_SMALL / 8];
-    pti_sphere8 spheres[PTI_SMALL / 8];
-    pti_lanes tag[PTI_SMALL / 4]; /* bits 0, 1, 2, ...: numbers of what is tested                           */
-    pti_tested tested[2 * PTI_SMALL];
-} pti_small;
-
-/* Are triangles a and b halves of a parallelogram, up to the rounding of its corners? Then c are its corners, the diagonal
-   from the first, and a is the half of its first edge. */
-static int pti_is_parallelogram(const pt_vec3 *a, const pt_vec3 *b, double extent, pt_vec3 *c)
-{
-    int i, j;
-    for (i = 0; i < 9; i++) {
-        const pt_vec3 p = a[i % 3], e = a[(i + 1) % 3], q = a[(i + 2) % 3], f = b[(i / 3 + 2) % 3];
-        const pti_d3 off = pti_d_sub(pti_d_between(p, e), pti_d_between(f, q));
-        j = i / 3;
-        if (memcmp(&p, &b[j], sizeof p) || memcmp(&q, &b[(j + 1) % 3], sizeof q)) continue;
-        if (pti_max3(off.x, off.y, off.z) > 2 * (double)PTI_U * extent) continue;
-        c[0] = p;
-        c[1] = e;
-        c[2] = q;
-        c[3] = f;
-        return 1;
-    }
-    return 0;
-}
-
-/* Lane i; 0 there: one without anything, where u = -10^30. The normal of a sliver is known to some 2^-51 |e1| |e2| only: where
-   it is not much longer, and where numbers overflow, NaN leaves the answer to the test in double. */
-static void pti_write_plane(pti_plane8 *out, uint32_t i, const pt_vec3 *c, int corners, int there)
-{
-    const pti_d3 o = pti_d_from(c[0]), e1 = pti_d_between(c[0], c[1]), e2 = pti_d_between(c[0], c[corners - 1]);
-    const pti_d3 n = pti_d_cross(e1, e2), u = pti_d_cross(e2, n), v = pti_d_cross(n, e1);
-    const double longest = pti_max3(n.x, n.y, n.z), square = pti_d_dot(n, n);
-    const double known = longest > 1e-6 * pti_max3(e1.x, e1.y, e1.z) * pti_max3(e2.x, e2.y, e2.z) ? 1 : HUGE_VAL - HUGE_VAL;
-    const double row[3][4] = {{n.x, n.y, n.z, -pti_d_dot(n, o)}, {u.x, u.y, u.z, -pti_d_dot(u, o)}, {v.x, v.y, v.z, -pti_d_dot(v, o)}};
-    double steep[3] = {0, 0, 0};
-    int k;
-    for (k = 0; k < 4; k++) {
-        out->n[k][i] = (float)(row[0][k] / longest * known);
-        out->u[k][i] = there ? (float)(row[1][k] / square) : k < 3 ? 0 : -1e30f;
-        out->v[k][i] = there ? (float)(row[2][k] / square) : 0;
-        if (k == 3) continue;
-        steep[0] += fabs(row[1][k] / square);
-        steep[1] += fabs(row[2][k] / square);
-        steep[2] += fabs((row[1][k] + row[2][k]) / square);
-    }
-    out->steep[i] = there ? (float)(pti_max3(steep[0], steep[1], steep[2]) * (1 + 4 * (double)PTI_U)) : 0;
-    out->both[i] = corners == 4;
-}
-
-/* Lane `lane` from primitive i on; how many it takes. */
-static uint32_t pti_write_flat(const pt_scene *scene, pti_small *out, uint32_t lane, uint32_t i, uint32_t flats)
-{
-    pti_tested *a = &out->tested[lane], *b = &out->tested[PTI_SMALL + lane];
-    pti_plane8 *plane = &out->planes[lane / 8];
-    const int there = i < flats;
-    pt_vec3 c[4], d[4], all[4];
-    int corners;
-    a->id = b->id = (int)(there ? i : flats - 1);
-    corners = pti_corners(scene, &scene->primitives[a->id], c);
-    a->half = corners == 4 ? 1 : 0;
-    b->half = 2 * a->half;
-    memcpy(a->corner, c, sizeof a->corner);
-    memcpy(b->corner, c, sizeof b->corner);
-    if (b->half) memcpy(b->corner + 1, c + 2, 2 * sizeof *c);
-    if (corners == 3 && i + 1 < flats && pti_corners(scene, &scene->primitives[i + 1], d) == 3 &&
-        pti_is_parallelogram(c, d, (double)scene->wide.extent, all)) {
-        b->id++;
-        memcpy(b->corner, d, sizeof b->corner);
-        pti_write_plane(plane, lane % 8, all, 4, 1);
-        return 2;
-    }
-    pti_write_plane(plane, lane % 8, c, corners, there);
-    return 1;
-}
-
-/* Planes of `flats` primitives, then spheres. 0 = no memory. */
-static int pti_build_small(const pt_scene *scene, pt_wide *wide, uint32_t flats)
-{
-    const uint32_t count = scene->primitive_count;
-    pti_small *out = (pti_small *)pti_alloc_lines(sizeof *out, &wide->memory, scene->alloc_user);
-    uint32_t i, lane = 0;
-    if (!out) return 0;
-    wide->arena = (unsigned char *)out;
-    wide->bytes = sizeof *out;
-    for (i = 0; i < 2 * PTI_SMALL; i++) out->tag[i / 8].bits[i % 8] = i;
-    for (i = 0; i < flats || lane % 8 > 0; lane++) i += pti_write_flat(scene, out, lane, i, flats);
-    wide->plane_blocks = (int)(lane / 8);
-    for (i = 0; flats + i < count || i % 8 > 0; i++, lane++) {
-        const uint32_t id = flats + i < count ? flats + i : count - 1;
-        out->tested[lane].id = out->tested[PTI_SMALL + lane].id = (int)id;
-        pti_write_sphere(scene, &out->spheres[i / 8], i % 8, id, flats + i < count);
-    }
-    wide->sphere_blocks = (int)(i / 8);
-    return 1;
-}
-
-/* What pt_commit calls: 1, or 0 without memory, or -1 if there are more than 2^29 lanes, or numbers too small or large. */
-static int pti_build_wide(const pt_scene *scene, pt_wide *wide)
-{
-    const double low = pti_max3((double)scene->lo.x, (double)scene->lo.y, (double)scene->lo.z);
-    const double high = pti_max3((double)scene->hi.x, (double)scene->hi.y, (double)scene->hi.z);
-    uint32_t count[3] = {0, 0, 0}, flats, i;
-    memset(wide, 0, sizeof *wide);
-    wide->extent = (float)fmax(low, high);
-    for (i = 0; i < scene->primitive_count; i++) count[scene->primitives[i].shape]++;
-    flats = count[PT_SHAPE_TRIANGLE] + count[PT_SHAPE_PARALLELOGRAM];
-    if ((size_t)scene->primitive_count + count[PT_SHAPE_PARALLELOGRAM] > (size_t)1 << 29) return -1;
-    if (!(wide->extent > PTI_LEAST_SPAN / 256 && wide->extent < PTI_MOST_SPAN / 2)) return -1;
-    if ((flats + 7) / 8 + (count[PT_SHAPE_SPHERE] + 7) / 8 <= PTI_SMALL / 8) return pti_build_small(scene, wide, flats);
-    return pti_build_wide_tree(scene, wide, count[PT_SHAPE_TRIANGLE], 2 * count[PT_SHAPE_PARALLELOGRAM]);
 }
 
 /* rows[0] x + rows[1] y + rows[2] z + w */
@@ -5795,41 +5823,54 @@ static int pti_test_both(const pt_scene *scene, const pti_ray *r, const pti_test
     return e[PTI_SMALL].id == e->id ? hit : hit | pti_test(scene, r, e[PTI_SMALL].id, best);
 }
 
-/* Tests what a start tells of if that is certain, as pti_planes_within has it, else all of its lane. As t is at most start + 2 X
-   then, apart from the tag, *limit, of starts, does not have to wait for numbers in double: 2 X < clear < start. */
+/* Tests what is known to be the only half of a lane that can be hit; sure: and certainly is. */
+PTI_INLINE int pti_test_half(const pti_ray *r, const pti_tested *e, int sure, pti_best *best)
+{
+    const pti_d3 a = pti_shear(r, &e->corner[0]), b = pti_shear(r, &e->corner[1]), c = pti_shear(r, &e->corner[2]);
+    double t, u, v;
+    if (sure) return pti_keep_sure(a, b, c, e->half, e->id, best);
+    return pti_sheared_triangle(r, a, b, c, pti_before(best, e->id), &t, &u, &v) &&
+           pti_keep(best, e->id, t, e->half == 1 ? u + v : u, e->half == 2 ? u + v : v);
+}
+
+/* Tests what a start tells of: one half of a lane, if that is certain, as pti_planes_within has it, else all of it. Where it is
+   certain that it is hit, t is at most start + 2 X, apart from the tag, so that *limit, of starts, does not have to wait for
+   numbers in double: 2 X < clear < start. */
 PTI_INLINE int pti_test_start(const pt_scene *scene, const pti_ray *r, const pti_ray8 *w, const pti_starts *s, float start, float *limit, pti_best *best)
 {
     const pti_tested *e = ((const pti_small *)(const void *)scene->wide.arena)->tested;
-    uint32_t at, lane;
+    uint32_t at, block, i;
     memcpy(&at, &start, sizeof at);
     at %= 2 * PTI_SMALL;
-    lane = at % PTI_SMALL;
-    if ((int)lane / 8 < s->planes) {
-        const float error = 2 * s->error[lane / 8].v[lane % 8], clear = error * s->clear, last = pti_last_start(pti_last_start(start) + clear);
-        if (s->inside[lane / 8].v[lane % 8] > error && fabsf(s->more[lane / 8].v[lane % 8]) > error && start > clear && 2 * start < s->end) {
+    block = at % PTI_SMALL / 8;
+    i = at % 8;
+    if ((int)block < s->planes && fabsf(s->more[block].v[i]) > 2 * s->error[block].v[i]) {
+        const float error = 2 * s->error[block].v[i], clear = error * s->clear;
+        if (s->inside[block].v[i] > error && start > clear && 2 * start < s->end) {
+            const float last = pti_last_start(pti_last_start(start) + clear);
             *limit = last < *limit ? last : *limit;
-            e += at;
-            return pti_keep_sure(pti_shear(r, &e->corner[0]), pti_shear(r, &e->corner[1]), pti_shear(r, &e->corner[2]), e->half, e->id, best);
+            return pti_test_half(r, e + at, 1, best);
         }
+        if (!pti_test_half(r, e + at, 0, best)) return 0;
+    } else if (!pti_test_both(scene, r, e + at % PTI_SMALL, best)) {
+        return 0;
     }
-    if (!pti_test_both(scene, r, e + lane, best)) return 0;
     *limit = pti_last_start(pti_ray8_limit(w, best->t));
     return 1;
 }
 
-/* The nearest, in the order of starts. */
-PTI_INLINE int pti_nearest_small(const pt_scene *scene, const pti_ray *r, const pti_ray8 *w, pti_best *best)
+/* The nearest: first by the tree, if there is one, up to a wall that is hit for certain; then in the order of starts. */
+PTI_INLINE int pti_nearest_apart(const pt_scene *scene, const pti_ray *r, pti_ray8 *w, pti_best *best)
 {
     const pti_small *small = (const pti_small *)(const void *)scene->wide.arena;
-    const pti_f8 zero = pti_f8_set(0);
-    pti_f8 least = pti_f8_set(HUGE_VALF);
+    const pti_f8 zero = pti_f8_set(0), none = pti_f8_set(HUGE_VALF);
+    pti_f8 least = none, wall = none, margin;
     pti_planes8 h;
     pti_starts s;
     float start, limit;
     int found = 0, i;
     s.clear = w->span / w->reach;
     s.end = pti_ray8_limit(w, best->t);
-    limit = pti_last_start(s.end);
     s.planes = scene->wide.plane_blocks;
     s.count = s.planes + scene->wide.sphere_blocks;
     for (i = 0; i < s.planes; i++) {
@@ -5839,18 +5880,27 @@ PTI_INLINE int pti_nearest_small(const pt_scene *scene, const pti_ray *r, const 
         s.more[i].f = h.more;
         s.error[i].f = h.error;
         least = pti_f8_min(least, s.t[i].f);
+        if (scene->wide.tree) {
+            pti_planes_within(&h, s.end, 2 * s.clear, &margin);
+            wall = pti_f8_min(wall, pti_f8_select(pti_f8_lt(zero, margin), pti_f8_add(h.t, h.off), none));
+        }
     }
     for (; i < s.count; i++) {
         s.t[i].f = pti_f8_tag(pti_sphere_lanes(&small->spheres[i - s.planes], w), small->tag[i].f);
         least = pti_f8_min(least, s.t[i].f);
     }
+    if (scene->wide.tree) {
+        limit = pti_last_start(pti_f8_least(wall));
+        found = pti_traverse_wide(scene, r, w, limit < s.end ? limit : s.end, best, 0);
+    }
+    limit = pti_last_start(found ? pti_ray8_limit(w, best->t) : s.end);
     for (start = pti_f8_least(least); start <= limit; start = pti_next_start(&s, start, limit))
         found |= pti_test_start(scene, r, w, &s, start, &limit, best);
     return found;
 }
 
 /* Any, in no order. */
-PTI_INLINE int pti_any_small(const pt_scene *scene, const pti_ray *r, const pti_ray8 *w, pti_best *best)
+PTI_INLINE int pti_any_apart(const pt_scene *scene, const pti_ray *r, pti_ray8 *w, pti_best *best)
 {
     const pti_small *small = (const pti_small *)(const void *)scene->wide.arena;
     const int planes = scene->wide.plane_blocks, count = planes + scene->wide.sphere_blocks;
@@ -5868,7 +5918,7 @@ PTI_INLINE int pti_any_small(const pt_scene *scene, const pti_ray *r, const pti_
     for (; i < count; i++) may |= (uint64_t)pti_m8_bits(pti_f8_le(pti_sphere_lanes(&small->spheres[i - planes], w), pti_f8_set(end))) << 8 * i;
     for (i = 0; i < PTI_SMALL && may >> i; i++)
         if ((may >> i & 1) && pti_test_both(scene, r, &small->tested[i], best)) return 1;
-    return 0;
+    return scene->wide.tree && pti_traverse_wide(scene, r, w, end, best, 1);
 }
 
 /* What pti_search calls: the nearest hit or any; -1: not a ray for lanes. */
@@ -5876,9 +5926,8 @@ PTI_INLINE int pti_search_wide(const pt_scene *scene, const pti_ray *r, pti_best
 {
     pti_ray8 w;
     if (!pti_ray8_make(&w, r, scene->wide.extent)) return -1;
-    if (scene->wide.plane_blocks + scene->wide.sphere_blocks > 0) return any ? pti_any_small(scene, r, &w, best) : pti_nearest_small(scene, r, &w, best);
-    pti_ray8_for_tree(&w, r);
-    return pti_traverse_wide(scene, r, &w, best, any);
+    if (scene->wide.plane_blocks + scene->wide.sphere_blocks == 0) return pti_traverse_wide(scene, r, &w, pti_ray8_limit(&w, best->t), best, any);
+    return any ? pti_any_apart(scene, r, &w, best) : pti_nearest_apart(scene, r, &w, best);
 }
 
 #endif /* PTI_HAS_WIDE */
@@ -7980,7 +8029,7 @@ static unsigned pti_find_needs(const pt_scene *scene)
     if (scene->bvh.node_count > 0) needs |= PT_NEEDS_BVH;
 #endif
 #if PTI_HAS_WIDE
-    if (scene->wide.bytes > 0 && scene->wide.plane_blocks + scene->wide.sphere_blocks == 0) needs |= PT_NEEDS_BVH;
+    if (scene->wide.tree) needs |= PT_NEEDS_BVH;
 #endif
     return needs;
 }

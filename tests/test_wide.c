@@ -138,10 +138,10 @@ static void lanes_together(void)
 
 /* ---- scenes ------------------------------------------------------------------------------------------------ */
 
-enum { TRIANGLES, QUADS, PARALLELOGRAMS, SPHERES, MIXED, BALL, SOUP, SLIVERS, FLAT, IDENTICAL, GIANT, CHAIN, ROOM, KINDS };
+enum { TRIANGLES, QUADS, PARALLELOGRAMS, SPHERES, MIXED, BALL, SOUP, SLIVERS, FLAT, IDENTICAL, GIANT, CHAIN, ROOM, FURNISHED, KINDS };
 static const char *const NAMES[KINDS] = {"triangles", "quads",   "parallelograms", "spheres",   "all shapes",
                                          "a ball",    "a soup",  "slivers",        "coplanar",  "identical",
-                                         "a giant among dwarfs", "a chain of 2^-i", "a room"};
+                                         "a giant among dwarfs", "a chain of 2^-i", "a room",      "a room with a ball"};
 
 static void add_ball(pt_scene *s, int rings, pt_vec3 c, double r, int m)
 {
@@ -207,6 +207,26 @@ static void add_room(pt_scene *s, int count, pt_vec3 at, double scale, int m)
     if (count % 2) pt_add_sphere(s, at, (pt_real)(0.3 * scale), m);
 }
 
+/* Walls that stand apart from a tree, of all kinds: pairs of triangles, parallelograms, and a triangle across; in it things for
+   the tree. */
+static void add_furnished(pt_scene *s, int count, pt_vec3 at, double scale, int m)
+{
+    const pt_vec3 x = v3(scale, 0, 0.2 * scale), y = v3(0, scale, 0), z = v3(-0.2 * scale, 0, scale);
+    const pt_vec3 low = pt_v3_sub(pt_v3_sub(at, x), pt_v3_add(y, z)), high = pt_v3_add(pt_v3_add(at, x), pt_v3_add(y, z));
+    const pt_vec3 across[3] = {pt_v3_add(low, x), pt_v3_add(low, pt_v3_scale(z, (pt_real)1.5)), pt_v3_add(low, y)};
+    const pt_vec3 axes[3] = {pt_v3_scale(x, 2), pt_v3_scale(y, 2), pt_v3_scale(z, 2)};
+    const uint32_t index[3] = {0, 1, 2};
+    int k;
+    for (k = 0; k < 3; k++) {
+        const pt_vec3 a = axes[k], b = axes[(k + 1) % 3];
+        pt_add_quad(s, low, pt_v3_add(low, a), pt_v3_add(pt_v3_add(low, a), b), pt_v3_add(low, b), m);
+        pt_add_parallelogram(s, high, pt_v3_neg(a), pt_v3_neg(b), m);
+    }
+    pt_add_mesh(s, across, NULL, NULL, 3, index, 1, m);
+    pt_add_sphere(s, low, (pt_real)(0.4 * scale), m);
+    if (count > 20) add_ball(s, (int)ceil(sqrt((count - 14) / 2.0)), at, 0.3 * scale, m);
+}
+
 static void fill(pt_scene *s, int kind, int count, pt_vec3 at, double scale)
 {
     pt_pcg32 rng = pt_pcg32_make(pt_test_seed(100 + (uint64_t)kind), (uint64_t)count);
@@ -214,6 +234,7 @@ static void fill(pt_scene *s, int kind, int count, pt_vec3 at, double scale)
     int k;
     if (kind == BALL) add_ball(s, (int)ceil(sqrt(count / 2.0)), at, scale, m);
     else if (kind == ROOM) add_room(s, count, at, scale, m);
+    else if (kind == FURNISHED) add_furnished(s, count, at, scale, m);
     else
         for (k = 0; k < count; k++) add_thing(s, kind, k, at, scale, &rng, m);
 }
@@ -630,6 +651,21 @@ static void count_below(const pt_scene *s, uint32_t at, const pti_node8 *n, int 
     }
 }
 
+/* The same for what stands apart. */
+static void count_apart(const pt_scene *s, census *c)
+{
+    const pti_small *small = (const pti_small *)(const void *)s->wide.arena;
+    int i, k;
+    for (i = 0; i < 8 * (s->wide.plane_blocks + s->wide.sphere_blocks); i++) {
+        const int sphere = i >= 8 * s->wide.plane_blocks, at = i - 8 * s->wide.plane_blocks;
+        if (sphere ? small->spheres[at / 8].centre[0][at % 8] > 1e29f : small->planes[i / 8].steep[i % 8] <= 0) continue; /* empty */
+        for (k = 0; k < (sphere ? 1 : 2); k++) {
+            const int id = small->tested[i + k * PTI_SMALL].id;
+            if (k == 0 || small->tested[i].half || id != small->tested[i].id) c->seen[id] = (unsigned char)(c->seen[id] + 1);
+        }
+    }
+}
+
 static void structure(void)
 {
     int kind, n;
@@ -641,10 +677,12 @@ static void structure(void)
             int missing = 0;
             if (!make(&s, kind, n, v3(0, 0, 0), 1, PT_TREE_DEFAULT)) return;
             c.seen = (unsigned char *)calloc(s.primitive_count + 1, 1);
-            if (c.seen) count_below(&s, s.wide.root, NULL, 0, 0, &c);
+            if (c.seen) count_apart(&s, &c);
+            if (c.seen && s.wide.tree) count_below(&s, s.wide.root, NULL, 0, 0, &c);
             for (i = 0; c.seen && i < s.primitive_count; i++) missing += c.seen[i] != (s.primitives[i].shape == PT_SHAPE_PARALLELOGRAM ? 2 : 1);
             pt_check(c.wrong == 0 && missing == 0, label("the wide tree of %s, %d", NAMES[kind], n),
                      "%d boxes or references are wrong, %d primitives are not in it once", c.wrong, missing);
+            pt_check(kind != FURNISHED || s.wide.plane_blocks == 1, "a room with a ball", "walls stand in %d blocks of eight lanes", s.wide.plane_blocks);
             if (kind == BALL && n > 20000) {
                 const double bytes = (double)s.wide.bytes / s.primitive_count;
                 printf("the wide tree: %.1f bytes a triangle, %.2f of 8 lanes used, depth %d\n", bytes, (double)c.lanes / c.leaves, c.depth);
