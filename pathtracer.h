@@ -1,4 +1,4 @@
-/* pathtracer.h - v0.5.1 - a path tracer in one C99 header: render by the rendering equation,
+/* pathtracer.h - v0.6.0 - a path tracer in one C99 header: render by the rendering equation,
    know how wrong the picture still is, and how long that took.      MIT-0 or public domain, see the end.
 
    Do this in exactly ONE C or C++ file, and include the header plainly everywhere else:
@@ -115,9 +115,9 @@
        the pt_real input. No constant is tuned to the size of a scene: rays start at an offset that
        follows from the rounding error of their own origin ([PT-06]). Sums over samples are double.
        Scenes of at most 64 materials, diffuse, mirror, smooth glass, metal, and 64 area lights are
-       rendered by paths that walk in lockstep ([PT-11b]), in float; up to 64 primitives are decided in
-       float as well, between primitives that are wider by the rounding of a hit. desc.no_lockstep asks
-       for one path at a time; the two agree in the mean, not in their bits.
+       rendered by paths that walk in lockstep ([PT-11b]), in float; up to 64 primitives, and the walls of
+       larger scenes, are decided in float as well, between primitives that are wider by the rounding of a
+       hit. desc.no_lockstep asks for one path at a time; the two agree in the mean, not in their bits.
        Build with -ffp-contract=off when two builds or two instances of the path integrator must give
        the same bits: a fused multiply-add rounds once where two operations round twice, and a
        compiler may fuse differently in each copy. Hits and misses of triangles do not depend on it.
@@ -199,9 +199,9 @@
    ===================================================================================================== */
 
 #define PT_VERSION_MAJOR 0
-#define PT_VERSION_MINOR 5
-#define PT_VERSION_PATCH 1
-#define PT_VERSION_STRING "0.5.1"
+#define PT_VERSION_MINOR 6
+#define PT_VERSION_PATCH 0
+#define PT_VERSION_STRING "0.6.0"
 
 #if (defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ > 0) || \
      defined(__ASSOCIATIVE_MATH__) || defined(__RECIPROCAL_MATH__) || defined(_M_FP_FAST)) && \
@@ -5921,6 +5921,18 @@ PTI_INLINE int pti_any_apart(const pt_scene *scene, const pti_ray *r, pti_ray8 *
     return scene->wide.tree && pti_traverse_wide(scene, r, w, end, best, 1);
 }
 
+/* Only what is in the tree, up to best->t: the nearest or any; -1: not a ray for lanes. */
+static int pti_nearest_in_tree(const pt_scene *scene, const pti_ray *r, pti_best *best)
+{
+    pti_ray8 w;
+    return pti_ray8_make(&w, r, scene->wide.extent) ? pti_traverse_wide(scene, r, &w, pti_ray8_limit(&w, best->t), best, 0) : -1;
+}
+static int pti_any_in_tree(const pt_scene *scene, const pti_ray *r, pti_best *best)
+{
+    pti_ray8 w;
+    return pti_ray8_make(&w, r, scene->wide.extent) ? pti_traverse_wide(scene, r, &w, pti_ray8_limit(&w, best->t), best, 1) : -1;
+}
+
 /* What pti_search calls: the nearest hit or any; -1: not a ray for lanes. */
 PTI_INLINE int pti_search_wide(const pt_scene *scene, const pti_ray *r, pti_best *best, int any)
 {
@@ -9427,9 +9439,10 @@ PTDEF pt_rgbd pt_li_branching(const pt_scene *scene, const pt_ray *ray, pt_sampl
    =====================================================================================================
    A path of a small scene spends its time on a few dozen multiplications at a time, one path after the other. Here as
    many paths as the machine has lanes walk together: each instruction takes one step of all of them, and a lane whose
-   path has ended takes the next path from a queue ([Lai13] for GPUs; here it is the lanes of one core). Scenes of more
-   than 64 primitives ask their tree for one ray after the other, and do the rest in lanes. The estimator is that of
-   pti_path, with three differences that change no expectation:
+   path has ended takes the next path from a queue ([Lai13] for GPUs; here it is the lanes of one core). In scenes of more
+   than 64 primitives lanes ask for the walls that stand apart from the tree [PT-07b], and the tree for one ray after the other,
+   if it may come near what is in it before it meets a wall. The estimator is that of pti_path, with three differences that
+   change no expectation:
 
    - Lights are sampled by area (spheres by their cone), which has no bound where a light touches a surface, so never
      without the weights of multiple importance sampling [Vea97] 9.2: the method "path-light" is left to pti_path. Where
@@ -9443,7 +9456,9 @@ PTDEF pt_rgbd pt_li_branching(const pt_scene *scene, const pt_ray *ray, pt_sampl
      point from its plane (derived at pti_lockstep_make). Primitives are wider by what rounding can do to a hit, so
      that no ray passes between two that share an edge. Scenes with parts smaller than 2048 e, or with edges sharper than
      8 degrees, ask their tree. A ball that touches a wall is not seen from within sqrt(4 e r) of the contact. The tree
-     decides as ever, and its hits keep their digits; of a lamp, whose points are in float, e is that of its own place.
+     decides as ever, also where a ray meets a wall so near an edge that rounding might, and its hits keep their digits; but
+     from a wall nothing is seen that lies closer to it than 2 e. Without walls, e is that of the lamps, whose points are in
+     float.
 
    A shadow ray starts and ends on surfaces. A plane that has all surfaces on one side cannot come between two points
    of them: the walls of a room are not asked. Parallelograms whose edges follow two axes are tested by three
@@ -9735,8 +9750,11 @@ typedef struct pti_lockstep {
     int light_count, sphere_lights, specular, metal, rough; /* specular: something is not diffuse; some metal; some rough one */
     int shading;                    /* some shading normals                                                */
     float e, e_camera;              /* how far a computed point may be off its plane; the same for rays of the camera */
-    const pt_scene *tree;           /* of more than that; then `of` has a column for each material, e is of lamps, and
-                                       rays are asked one after the other                                        */
+    const pt_scene *tree;           /* of more than that: what is not a wall is asked for one ray after the other  */
+    int walls;                      /* then `of` has these first, and a column for each material; without walls e is of lamps */
+    double plane[PTI_WALLS][4];     /* n.p + d = 0 of walls                                                    */
+    int from[PTI_WALLS], to[PTI_WALLS]; /* the primitives that each is                                         */
+    float box[6];                   /* around what is in the tree: lower, then upper                          */
 } pti_lockstep;
 
 /* A primitive while the scene is being made ready: 0 (sphere), 3 or 4 corners. */
@@ -9744,7 +9762,7 @@ typedef struct pti_lock_item {
     pt_vec3 c[4];
     double radius;
     int corners, kind, material, light, twin; /* twin: the other triangle's light, or -1                    */
-    int blocks;
+    int blocks, from, to;   /* from, to: primitives                                                        */
 } pti_lock_item;
 
 /* Across which axis is it a rectangle along the other two? -1: it is none. */
@@ -9777,16 +9795,18 @@ static uint32_t pti_lock_collect(const pt_scene *scene, uint32_t i, double exten
     const pt_primitive *p = &scene->primitives[i];
     pt_vec3 other[4], all[4];
     pti_lock_single(scene, p, q);
+    q->from = q->to = (int)i;
     if (q->corners == 0) return 1;
     if (q->corners == 3 && i + 1 < scene->primitive_count && p[1].shape == PT_SHAPE_TRIANGLE && pti_corners(scene, &p[1], other) == 3 &&
         pti_primitive_material(scene, &p[1]) == q->material && pti_is_parallelogram(q->c, other, extent, all)) {
         memcpy(q->c, all, sizeof all);
         q->corners = 4;
         q->twin = p[1].light;
+        q->to++;
     }
     q->kind = pti_lock_axis(q);
     if (q->kind < 0) q->kind = q->corners == 4 ? PTI_LOCK_QUADS : PTI_LOCK_TRIANGLES;
-    return q->corners == 4 && p->shape == PT_SHAPE_TRIANGLE ? 2 : 1;
+    return (uint32_t)(q->to - q->from) + 1;
 }
 
 static pti_d3 pti_lock_normal(const pti_lock_item *q)
@@ -9927,8 +9947,8 @@ static void pti_lock_write_material(pti_lockstep *k, const pt_material *m, int i
     k->rough |= !pti_is_smooth(m);
 }
 
-/* Writes item q as number i; returns its smallest measure: from the middle to an edge, across a ball. */
-static double pti_lock_write(pti_lockstep *k, const pt_scene *scene, const pti_lock_item *q, int i, double *sum)
+/* Writes item q as number i, but for its light; returns its smallest measure: from the middle to an edge, across a ball. */
+static double pti_lock_write(pti_lockstep *k, const pt_scene *scene, const pti_lock_item *q, int i)
 {
     pti_d3 n = pti_d(0, 0, 0);
     double depth = q->radius;
@@ -9943,15 +9963,19 @@ static double pti_lock_write(pti_lockstep *k, const pt_scene *scene, const pti_l
     }
     pti_lock_put(k->of, PTI_OF_N, i, n);
     k->of[PTI_OF_D][i] = (float)-pti_d_dot(n, pti_d_from(q->c[0]));
+    if (k->tree) {
+        k->plane[i][0] = n.x;
+        k->plane[i][1] = n.y;
+        k->plane[i][2] = n.z;
+        k->plane[i][3] = -pti_d_dot(n, pti_d_from(q->c[0]));
+        k->from[i] = q->from;
+        k->to[i] = q->to;
+    }
     pti_lock_put(k->of, PTI_OF_CENTRE, i, pti_lock_middle(q));
     k->of[PTI_OF_DEPTH][i] = (float)depth;
     k->of[PTI_OF_RADIUS][i] = (float)q->radius;
     pti_lock_write_material(k, &scene->materials[q->material], i);
-    k->of[PTI_OF_LIGHT][i] = -1;
-    if (q->light >= 0) {
-        k->of[PTI_OF_LIGHT][i] = (float)k->light_count;
-        pti_lock_write_light(k, scene, q, n, sum);
-    }
+    k->of[PTI_OF_LIGHT][i] = (float)q->light;
     return q->corners ? depth : 2 * depth;
 }
 
@@ -9986,9 +10010,122 @@ static int pti_lock_bright(const pti_lockstep *k)
 /* Is the smallest thing large enough beside e, and for squares and densities of lengths in float? */
 static int pti_lock_large(const pti_lockstep *k, double smallest) { return smallest > 2048 * (double)k->e && smallest > PTI_LOCK_LEAST; }
 
+/* Writes items class by class, what blocks first, and lights as they come where `sum` adds up their probabilities; the smallest
+   measure. */
+static double pti_lock_write_items(pti_lockstep *k, const pt_scene *scene, const pti_lock_item *items, int count, double *sum)
+{
+    double smallest = HUGE_VAL;
+    int kind, blocks, j, n = 0;
+    for (kind = 0; kind < PTI_LOCK_CLASSES; kind++) {
+        k->begin[kind] = n;
+        for (blocks = 1; blocks >= 0; blocks--) {
+            for (j = 0; j < count; j++) {
+                const pti_lock_item *q = &items[j];
+                if (q->kind != kind || q->blocks != blocks) continue;
+                smallest = fmin(smallest, pti_lock_write(k, scene, q, n));
+                if (sum && q->light >= 0) {
+                    k->of[PTI_OF_LIGHT][n] = (float)k->light_count;
+                    pti_lock_write_light(k, scene, q, q->corners ? pti_lock_normal(q) : pti_d(0, 0, 0), sum);
+                }
+                n++;
+            }
+            if (blocks) k->blockers[kind] = n;
+        }
+    }
+    k->begin[PTI_LOCK_CLASSES] = n;
+    return smallest;
+}
+
+/* Which of them block, seen by `all` there is; 0: two of them are a wedge. */
+static int pti_lock_relate(pti_lock_item *items, int count, int all, double e)
+{
+    int i, j;
+    for (j = 0; j < count; j++) {
+        items[j].blocks = pti_lock_blocks(&items[j], items, all, e);
+        for (i = 0; i < j; i++)
+            if (pti_lock_wedge(&items[j], &items[i], 4 * e)) return 0;
+    }
+    return 1;
+}
+
+/* How far a computed point may be off its plane. With u = 2^-24 and all coordinates at most x, the height n.p + d of a point is
+   computed with an error of 3 roundings of at most 3.5 x each, putting the point back on the plane rounds its coordinates once
+   (1.8 u x), and a plane is off its corners by the roundings of n and d (4.4 u x): all together below 17 u x = e. */
+static float pti_lock_error(double x) { return (float)(17 * PTI_2_M24 * x); }
+
+static double pti_lock_extent(const pt_scene *scene)
+{
+    return fmax(pti_max3((double)scene->lo.x, (double)scene->lo.y, (double)scene->lo.z),
+                pti_max3((double)scene->hi.x, (double)scene->hi.y, (double)scene->hi.z));
+}
+
+/* The walls that stand apart from the scene's tree, and the corners of its box in two items more; 0: not all are items, or some have
+   shading normals. */
+static int pti_lock_collect_walls(const pt_scene *scene, pti_lock_item *items)
+{
+    const pti_small *small = (const pti_small *)(const void *)scene->wide.arena;
+    const pt_vec3 a = scene->lo, b = scene->hi;
+    int lane, count = 0, k;
+    for (lane = 0; lane < 8 * scene->wide.plane_blocks; lane++) {
+        const uint32_t id = (uint32_t)small->tested[lane].id, other = (uint32_t)small->tested[PTI_SMALL + lane].id;
+        const pt_primitive *p = &scene->primitives[id];
+        if (!(small->planes[lane / 8].steep[lane % 8] > 0)) continue; /* no one's */
+        if (pti_lock_collect(scene, id, (double)scene->wide.extent, &items[count++]) != 1 + (id != other)) return 0;
+        if (p->shape == PT_SHAPE_TRIANGLE && scene->meshes[scene->triangles[p->index].mesh].has_normals) return 0;
+    }
+    for (k = 0; k < 2; k++) {
+        const pt_real z = k ? b.z : a.z;
+        pti_lock_item *q = &items[count + k];
+        memset(q, 0, sizeof *q);
+        q->corners = 4;
+        q->c[0] = pt_v3(a.x, a.y, z);
+        q->c[1] = pt_v3(b.x, a.y, z);
+        q->c[2] = pt_v3(b.x, b.y, z);
+        q->c[3] = pt_v3(a.x, b.y, z);
+    }
+    return count;
+}
+
+/* The box of the children of the root. */
+static void pti_lock_write_box(pti_lockstep *k, const pt_wide *tree)
+{
+    const pti_node8 *root = (const pti_node8 *)(const void *)pti_place(tree, tree->root);
+    int i, j;
+    for (i = 0; i < 3; i++) {
+        k->box[i] = root->box[i][0];
+        k->box[3 + i] = root->box[3 + i][0];
+        for (j = 1; j < 8; j++) {
+            if (root->box[i][j] < k->box[i]) k->box[i] = root->box[i][j];
+            if (root->box[3 + i][j] > k->box[3 + i]) k->box[3 + i] = root->box[3 + i][j];
+        }
+    }
+}
+
+/* Lets lanes ask for the walls of a scene that is ready otherwise, if they and its lamps (of that smallest measure) are large
+   beside what rounding is in all of the scene, and as seen from the eye; else all is left to the tree. */
+static void pti_lockstep_make_walls(pti_lockstep *k, const pt_scene *scene, pt_vec3 eye, double smallest)
+{
+    const double x = pti_lock_extent(scene), from = fmax(x, pti_max3((double)eye.x, (double)eye.y, (double)eye.z));
+    pti_lock_item items[2 * PTI_WALLS + 2];
+    pti_lockstep all = *k;
+    int count, i;
+    if (!scene->wide.tree || scene->wide.plane_blocks == 0 || (scene->wide.root & 7) != PTI_NODE) return;
+    count = pti_lock_collect_walls(scene, items);
+    if (count == 0 || count + (int)scene->material_count > PTI_LOCK_MAX) return;
+    all.e = pti_lock_error(x);
+    all.e_camera = pti_lock_error(from);
+    if (!pti_lock_relate(items, count, count + 2, (double)all.e)) return;
+    smallest = fmin(smallest, pti_lock_write_items(&all, scene, items, count, NULL));
+    if (!pti_lock_large(&all, smallest) || !(smallest > 64 * (double)all.e_camera) || !(x < 1e15)) return;
+    for (i = 0; i < (int)scene->material_count; i++) pti_lock_write_material(&all, &scene->materials[i], count + i);
+    pti_lock_write_box(&all, &scene->wide);
+    all.walls = count;
+    *k = all;
+}
+
 /* Makes a scene of any size ready, whose rays are asked of its tree. Lamps are few, and as large beside e as what a small scene is
    made of: their points are in float. */
-static int pti_lockstep_make_tree(pti_lockstep *k, const pt_scene *scene)
+static int pti_lockstep_make_tree(pti_lockstep *k, const pt_scene *scene, pt_vec3 eye)
 {
     double smallest = HUGE_VAL, sum = 0, x = 0;
     uint32_t i, j;
@@ -10010,43 +10147,29 @@ static int pti_lockstep_make_tree(pti_lockstep *k, const pt_scene *scene)
         smallest = fmin(smallest, q.corners ? pti_lock_write_flat(&q, unused) : 2 * q.radius);
         pti_lock_write_light(k, scene, &q, q.corners ? pti_lock_normal(&q) : pti_d(0, 0, 0), &sum);
     }
-    k->e = (float)(17 * PTI_2_M24 * x);
-    return pti_lock_bright(k) && pti_lock_large(k, smallest) && x < 1e15;
+    k->e = pti_lock_error(x);
+    if (!pti_lock_bright(k) || !pti_lock_large(k, smallest) || !(x < 1e15)) return 0;
+    pti_lockstep_make_walls(k, scene, eye, smallest);
+    return 1;
 }
 
-/* Makes a scene ready; 0: it is not one for lanes, or not seen from such a place. With u = 2^-24 and all coordinates at
-   most x, the height n.p + d of a point is computed with an error of 3 roundings of at most 3.5 x each, putting the
-   point back on the plane rounds its coordinates once (1.8 u x), and a plane is off its corners by the roundings of n
-   and d (4.4 u x): all together below 17 u x = e. */
+/* Makes a small scene ready; 0: it is not one for lanes, or not seen from such a place. */
 static int pti_lockstep_make(pti_lockstep *k, const pt_scene *scene, pt_vec3 eye)
 {
-    const double x = fmax(pti_max3((double)scene->lo.x, (double)scene->lo.y, (double)scene->lo.z),
-                          pti_max3((double)scene->hi.x, (double)scene->hi.y, (double)scene->hi.z));
-    const double from = fmax(x, pti_max3((double)eye.x, (double)eye.y, (double)eye.z));
+    const double x = pti_lock_extent(scene), from = fmax(x, pti_max3((double)eye.x, (double)eye.y, (double)eye.z));
     pti_lock_item items[PTI_LOCK_MAX];
-    double smallest = HUGE_VAL, sum = 0;
+    double smallest, sum = 0;
     uint32_t i;
-    int count = 0, n = 0, kind, j, blocks;
+    int count = 0, j;
     if (!pti_lock_knows(scene, 0) || scene->primitive_count > PTI_LOCK_MAX) return 0;
     memset(k, 0, sizeof *k);
-    k->e = (float)(17 * PTI_2_M24 * x);
-    k->e_camera = (float)(17 * PTI_2_M24 * from);
+    k->e = pti_lock_error(x);
+    k->e_camera = pti_lock_error(from);
     for (i = 0; i < scene->primitive_count; count++) i += pti_lock_collect(scene, i, x, &items[count]);
-    for (j = 0; j < count; j++) {
+    for (j = 0; j < count; j++)
         if (!pti_lock_takes(&scene->materials[items[j].material])) return 0;
-        items[j].blocks = pti_lock_blocks(&items[j], items, count, (double)k->e);
-        for (kind = 0; kind < j; kind++)
-            if (pti_lock_wedge(&items[j], &items[kind], 4 * (double)k->e)) return 0;
-    }
-    for (kind = 0; kind < PTI_LOCK_CLASSES; kind++) {
-        k->begin[kind] = n;
-        for (blocks = 1; blocks >= 0; blocks--) {
-            for (j = 0; j < count; j++)
-                if (items[j].kind == kind && items[j].blocks == blocks) smallest = fmin(smallest, pti_lock_write(k, scene, &items[j], n++, &sum));
-            if (blocks) k->blockers[kind] = n;
-        }
-    }
-    k->begin[PTI_LOCK_CLASSES] = n;
+    if (!pti_lock_relate(items, count, count, (double)k->e)) return 0;
+    smallest = pti_lock_write_items(k, scene, items, count, &sum);
     return pti_lock_bright(k) && pti_lock_large(k, smallest) && smallest > 64 * (double)k->e_camera && x < 1e15;
 }
 
@@ -10276,8 +10399,8 @@ PTI_INLINE8 void pti_lock_face(const pti_lockstep *k, pti_lock_surface *s, pti_w
     s->kind = k->specular ? pti_fw_gather(k->of[PTI_OF_KIND], s->i) : pti_fw_set((float)PT_MATERIAL_DIFFUSE);
 }
 
-/* The point at t, put back on its surface and away from its edges. */
-PTI_INLINE8 void pti_lock_land(const pti_lockstep *k, pti_w3 o, pti_w3 d, const pti_lock_best *best, pti_lock_surface *s)
+/* The point at t, put back on its surface and away from its edges; the normal there. */
+PTI_INLINE8 pti_w3 pti_lock_land(const pti_lockstep *k, pti_w3 o, pti_w3 d, const pti_lock_best *best, pti_lock_surface *s)
 {
     const pti_fw zero = pti_fw_set(0), inset = pti_fw_set(16 * k->e);
     const pti_mw brim = pti_fw_lt(best->margin, inset);
@@ -10298,7 +10421,7 @@ PTI_INLINE8 void pti_lock_land(const pti_lockstep *k, pti_w3 o, pti_w3 d, const 
         s->p = pti_w3_select(s->ball, pti_w3_along(out, pti_fw_gather(k->of[PTI_OF_RADIUS], s->i), centre), s->p);
     }
     s->light = pti_fw_gather(k->of[PTI_OF_LIGHT], s->i);
-    pti_lock_face(k, s, n, d);
+    return n;
 }
 
 /* The ray of a lane, with all digits of its origin. */
@@ -10310,24 +10433,119 @@ static pti_ray pti_lock_ray(const pti_lane_row *row, int lane)
     return pti_ray_from(pti_d(o[0], o[1], o[2]), pti_d((double)row[PTI_ROW_D].v[lane], (double)row[PTI_ROW_D + 1].v[lane], (double)row[PTI_ROW_D + 2].v[lane]), HUGE_VAL);
 }
 
-/* pti_lock_nearest and pti_lock_land by the scene's tree. */
-static void pti_lock_meet(const pti_lockstep *k, const pti_lane_row *row, unsigned active, pt_hit *hits, pti_lock_best *best, pti_lock_surface *s)
+/* Lanes whose rays may come within 4 e of what is in the tree by t = end: slabs as in pti_ray8_axis, whose errors e covers. */
+PTI_INLINE8 unsigned pti_lock_boxed(const pti_lockstep *k, pti_w3 o, pti_w3 d, float e, pti_fw end)
 {
-    pti_lane_row p[3], n[3], ns[3], t, i, light;
-    unsigned balls = 0;
-    memset(p, 0, sizeof p);
-    memset(n, 0, sizeof n);
-    memset(ns, 0, sizeof ns);
-    memset(&i, 0, sizeof i);
-    t.f = pti_fw_set(PTI_LOCK_FAR);
-    light.f = pti_fw_set(-1);
+    const pti_fw from[3] = {o.x, o.y, o.z}, along[3] = {d.x, d.y, d.z}, flat = pti_fw_set(1e-8f), zero = pti_fw_set(0);
+    pti_fw begin = zero;
+    int i;
+    for (i = 0; i < 3; i++) {
+        const pti_fw q = pti_fw_div(pti_fw_set(1), pti_fw_select(pti_fw_lt(pti_fw_abs(along[i]), flat), flat, along[i]));
+        const pti_fw a = pti_fw_mul(pti_fw_sub(pti_fw_set(k->box[i] - 4 * e), from[i]), q);
+        const pti_fw b = pti_fw_mul(pti_fw_sub(pti_fw_set(k->box[3 + i] + 4 * e), from[i]), q);
+        begin = pti_fw_max(begin, pti_fw_min(a, b));
+        end = pti_fw_min(end, pti_fw_max(a, b));
+    }
+    return pti_mw_bits(pti_fw_le(begin, end));
+}
+
+/* What paths in lanes have met in a scene with a tree: a wall, or, where that is -1, what the hit tells. */
+typedef struct pti_lock_met {
+    pt_hit hit[PTI_WIDTH];
+    int wall[PTI_WIDTH];
+} pti_lock_met;
+
+/* Height above a wall, or along its normal. */
+PTI_INLINE double pti_lock_along(const double *plane, const double *v) { return plane[0] * v[0] + plane[1] * v[1] + plane[2] * v[2]; }
+
+/* Asks the tree for the ray of a lane: what is before the wall it meets, or at all (-1). In double, so that what lies on a wall is
+   seen. */
+static int pti_lock_meet_tree(const pti_lockstep *k, const pti_ray *r, int wall, pt_hit *hit)
+{
+    pti_best best = {(double)PTI_REAL_MAX, 0, 0, -1};
+    int found;
+    if (wall >= 0) {
+        const double *plane = k->plane[wall], t = -(pti_lock_along(plane, r->o) + plane[3]) / pti_lock_along(plane, r->d);
+        if (t > 0 && t < best.t) best.t = t;
+    }
+    found = pti_nearest_in_tree(k->tree, r, &best);
+    if (found < 0) return pti_intersect(k->tree, r, hit);
+    if (found) pti_fill(k->tree, r, &best, hit);
+    return found;
+}
+
+/* The nearest wall that lanes find, unless a ray meets it so near an edge, 2 slacks of pti_lock_keep, that rounding may decide: then
+   all is asked in double, since the other side of that edge may be in the tree. Returns the lanes that meet what is in it. */
+static unsigned pti_lock_nearest_wall(const pti_lockstep *k, const pti_lane_row *row, unsigned active, float e, pt_hit *hits,
+                                      pti_lock_best *best)
+{
+    const pti_w3 d = pti_row3(row + PTI_ROW_D);
+    pti_lane_row t, i, margin;
+    unsigned told = 0;
+    pti_fw along;
+    pti_lock_nearest(k, pti_row3(row + PTI_ROW_O), d, e, best);
+    along = pti_fw_abs(pti_w3_dot(pti_gather3(k->of, PTI_OF_N, pti_uw_from_floats(best->i)), d));
+    active &= pti_mw_bits(pti_fw_lt(pti_fw_mul(best->margin, along), pti_fw_set(4 * e)));
+    if (!active) return 0;
+    t.f = best->t;
+    i.f = best->i;
+    margin.f = best->margin;
     for (; active; active &= active - 1) {
         const int lane = pti_lowest_bit(active);
         const pti_ray r = pti_lock_ray(row, lane);
         pt_hit *hit = &hits[lane];
-        if (!pti_intersect(k->tree, &r, hit)) continue;
+        const int found = pti_intersect(k->tree, &r, hit);
+        int wall = 0;
+        while (found && wall < k->walls && (hit->primitive < k->from[wall] || hit->primitive > k->to[wall])) wall++;
+        told |= (unsigned)(found && wall == k->walls) << lane;
+        t.v[lane] = found ? hit->t : PTI_LOCK_FAR;
+        i.v[lane] = (float)(wall < k->walls ? wall : 0);
+        margin.v[lane] = found ? 0 : PTI_LOCK_FAR;
+    }
+    best->t = t.f;
+    best->i = i.f;
+    best->margin = margin.f;
+    return told;
+}
+
+/* pti_lock_nearest and pti_lock_land for scenes with a tree. */
+static void pti_lock_meet(const pti_lockstep *k, const pti_lane_row *row, unsigned active, float e, pti_lock_met *met,
+                          pti_lock_best *best, pti_lock_surface *s)
+{
+    const pti_w3 d = pti_row3(row + PTI_ROW_D), zero = pti_w3_scale(d, pti_fw_set(0));
+    pti_lane_row p[3], n[3], ns[3], t, i, light;
+    unsigned balls = 0, asks = active, told = 0;
+    pti_w3 normal = zero;
+    s->p = zero;
+    s->i = pti_uw_set(0);
+    s->light = pti_fw_set(-1);
+    best->t = pti_fw_set(PTI_LOCK_FAR);
+    if (k->walls > 0) {
+        const pti_w3 o = pti_row3(row + PTI_ROW_O);
+        pti_fw off;
+        told = pti_lock_nearest_wall(k, row, active, e, met->hit, best);
+        normal = pti_lock_land(k, o, d, best, s);
+        off = pti_fw_div(pti_fw_set(4 * e), pti_fw_abs(pti_w3_dot(normal, d)));
+        asks &= told | pti_lock_boxed(k, o, d, e, pti_fw_add(best->t, off));
+    }
+    pti_row3_set(p, s->p);
+    pti_row3_set(n, normal);
+    pti_row3_set(ns, normal);
+    t.f = best->t;
+    i.u = s->i;
+    light.f = s->light;
+    for (; active; active &= active - 1) {
+        const int lane = pti_lowest_bit(active);
+        pt_hit *hit = &met->hit[lane];
+        met->wall[lane] = k->walls > 0 && t.v[lane] < PTI_LOCK_FAR ? (int)i.bits[lane] : -1;
+        if (!(asks >> lane & 1)) continue;
+        if (!(told >> lane & 1)) {
+            const pti_ray r = pti_lock_ray(row, lane);
+            if (!(k->walls > 0 ? pti_lock_meet_tree(k, &r, met->wall[lane], hit) : pti_intersect(k->tree, &r, hit))) continue;
+        }
+        met->wall[lane] = -1;
         t.v[lane] = hit->t;
-        i.bits[lane] = (uint32_t)hit->material;
+        i.bits[lane] = (uint32_t)(k->walls + hit->material);
         light.v[lane] = (float)hit->light;
         balls |= (unsigned)(hit->shape == PT_SHAPE_SPHERE) << lane;
         p[0].v[lane] = hit->p.x, p[1].v[lane] = hit->p.y, p[2].v[lane] = hit->p.z;
@@ -10339,35 +10557,55 @@ static void pti_lock_meet(const pti_lockstep *k, const pti_lane_row *row, unsign
     s->p = pti_row3(p);
     s->ball = pti_mw_of_bits(balls);
     s->light = light.f;
-    pti_lock_face(k, s, pti_row3(n), pti_row3(row + PTI_ROW_D));
+    pti_lock_face(k, s, pti_row3(n), d);
     if (!k->shading) return;
     s->n = pti_w3_select(s->front, pti_row3(ns), pti_w3_scale(pti_row3(ns), pti_fw_set(-1)));
-    s->cosine = pti_fw_sub(pti_fw_set(0), pti_w3_dot(s->n, pti_row3(row + PTI_ROW_D)));
+    s->cosine = pti_fw_sub(pti_fw_set(0), pti_w3_dot(s->n, d));
 }
 
-/* Shadow rays by the tree, from hits to points of lights that are moved off: the lanes that something blocks. */
-static pti_mw pti_lock_blocked(const pti_lockstep *k, const pt_hit *hits, unsigned active, pti_w3 q, pti_w3 w)
+/* Where the ray from what a lane has met in direction w starts for the tree; lifted: where it starts for walls. */
+static pti_d3 pti_lock_origin(const pti_lock_met *met, int lane, const pti_lane_row *lifted, const pti_lane_row *w)
 {
-    pti_lane_row to[3], d[3];
+    if (met->wall[lane] >= 0) return pti_d((double)lifted[0].v[lane], (double)lifted[1].v[lane], (double)lifted[2].v[lane]);
+    return pti_leave(&met->hit[lane], pt_v3(w[0].v[lane], w[1].v[lane], w[2].v[lane]));
+}
+
+/* Shadow rays in a scene with a tree, from hits (o for lanes) to points q of lights that are moved off: the lanes that something
+   blocks. */
+static pti_mw pti_lock_blocked(const pti_lockstep *k, const pti_lock_met *met, unsigned active, pti_w3 o, pti_w3 q, pti_w3 w, pti_fw distance)
+{
+    pti_lane_row from[3], to[3], d[3];
     unsigned blocked = 0;
+    if (k->walls > 0) {
+        pti_lock_best end;
+        end.t = distance;
+        end.i = end.margin = end.key = pti_fw_set(0);
+        blocked = active & pti_mw_bits(pti_lock_ask(k, o, w, k->e, &end, PTI_LOCK_ANY));
+        active &= ~blocked & pti_lock_boxed(k, o, w, k->e, distance);
+    }
+    pti_row3_set(from, o);
     pti_row3_set(to, q);
     pti_row3_set(d, w);
     for (; active; active &= active - 1) {
         const int lane = pti_lowest_bit(active);
-        const pti_d3 o = pti_leave(&hits[lane], pt_v3(d[0].v[lane], d[1].v[lane], d[2].v[lane]));
+        const pti_d3 start = pti_lock_origin(met, lane, from, d);
         const pti_d3 end = pti_d((double)to[0].v[lane], (double)to[1].v[lane], (double)to[2].v[lane]);
-        const pti_ray r = pti_ray_from(o, pti_d_sub(end, o), 1);
-        blocked |= (unsigned)pti_occluded(k->tree, &r) << lane;
+        const pti_ray r = pti_ray_from(start, pti_d_sub(end, start), 1);
+        pti_best best = {1, 0, 0, -1};
+        int found = k->walls > 0 ? pti_any_in_tree(k->tree, &r, &best) : -1;
+        if (found < 0) found = pti_occluded(k->tree, &r);
+        blocked |= (unsigned)found << lane;
     }
     return pti_mw_of_bits(blocked);
 }
 
-/* The next origins of lanes. */
-static void pti_lock_depart(pti_lane_row *row, const pt_hit *hits, unsigned active)
+/* The next origins of lanes; lifted: those from walls. */
+static void pti_lock_depart(pti_lane_row *row, const pti_lock_met *met, pti_w3 lifted, unsigned active)
 {
+    pti_row3_set(row + PTI_ROW_O, lifted);
     for (; active; active &= active - 1) {
         const int lane = pti_lowest_bit(active);
-        const pti_d3 o = pti_leave(&hits[lane], pt_v3(row[PTI_ROW_D].v[lane], row[PTI_ROW_D + 1].v[lane], row[PTI_ROW_D + 2].v[lane]));
+        const pti_d3 o = pti_lock_origin(met, lane, row + PTI_ROW_O, row + PTI_ROW_D);
         const double all[3] = {o.x, o.y, o.z};
         int k;
         for (k = 0; k < 3; k++) {
@@ -10613,8 +10851,8 @@ PTI_INLINE8 pti_fw pti_lock_flat_point(const pti_lockstep *k, pti_uw light, cons
     return pti_lit(k, PTI_LIT_DENSITY, light);
 }
 
-/* Asks a point of a light for its light; how many rays that took. hits: for trees; f: NULL where nothing is rough. */
-PTI_INLINE8 int pti_lock_direct(const pti_lockstep *k, const pti_lock_surface *s, const pt_hit *hits, const pti_lock_facets *f, pti_w3 albedo,
+/* Asks a point of a light for its light; how many rays that took. met: for trees; f: NULL where nothing is rough. */
+PTI_INLINE8 int pti_lock_direct(const pti_lockstep *k, const pti_lock_surface *s, const pti_lock_met *met, const pti_lock_facets *f, pti_w3 albedo,
                                pti_mw active, const pti_lock_numbers *u, pti_lane_row *row, pt_heuristic heuristic)
 {
     const pti_fw zero = pti_fw_set(0);
@@ -10658,7 +10896,7 @@ PTI_INLINE8 int pti_lock_direct(const pti_lockstep *k, const pti_lock_surface *s
         other = pti_fw_select(some, of_facets, other);
     }
     weight = pti_fw_div(pti_lock_weight(p, other, heuristic), p);
-    weight = pti_fw_select(k->tree ? pti_lock_blocked(k, hits, pti_mw_bits(active), q, w) : pti_lock_ask(k, o, w, k->e, &end, PTI_LOCK_ANY), zero, weight);
+    weight = pti_fw_select(k->tree ? pti_lock_blocked(k, met, pti_mw_bits(active), o, q, w, distance) : pti_lock_ask(k, o, w, k->e, &end, PTI_LOCK_ANY), zero, weight);
     weight = pti_fw_select(active, weight, zero);
     value = pti_w3_mul(value, pti_w3_mul(pti_row3(row + PTI_ROW_BETA), pti_lit3(k, PTI_LIT_EMISSION, light)));
     pti_row3_set(row + PTI_ROW_SUM, pti_w3_along(value, weight, pti_row3(row + PTI_ROW_SUM)));
@@ -10769,7 +11007,7 @@ typedef struct pti_lock_work {
     unsigned hit;                   /* lanes whose first edge met something, and what that is: albedo,     */
     pti_lane_row seen[7];           /*   normal, distance                                                  */
     pti_lane_row row[PTI_ROWS];
-    pt_hit hits[PTI_WIDTH];         /* what lanes have met, where a tree is asked                           */
+    pti_lock_met met;               /* what lanes have met, where a tree is asked                           */
     uint32_t queue[PTI_LOCK_QUEUE][PTI_ROWS]; /* paths that wait for a lane                                */
     double slots[PTI_LOCK_SLOTS][3]; /* what each path has found                                           */
 } pti_lock_work;
@@ -10801,10 +11039,10 @@ static unsigned pti_lock_vertex(pti_lock_work *w, pti_lane_row *row, unsigned ac
     pti_mw go;
     w->rays += (uint64_t)pti_count_bits(active);
     if (k->tree) {
-        pti_lock_meet(k, row, active, w->hits, &best, &s);
+        pti_lock_meet(k, row, active, first ? k->e_camera : k->e, &w->met, &best, &s);
     } else {
         pti_lock_nearest(k, o, d, first ? k->e_camera : k->e, &best);
-        pti_lock_land(k, o, d, &best, &s);
+        pti_lock_face(k, &s, pti_lock_land(k, o, d, &best, &s), d);
     }
     s.met = pti_mw_and(pti_mw_of_bits(active), pti_fw_lt(best.t, pti_fw_set(PTI_LOCK_FAR)));
     if (first && w->describes) pti_lock_describe(w, &s, &best);
@@ -10817,7 +11055,7 @@ static unsigned pti_lock_vertex(pti_lock_work *w, pti_lane_row *row, unsigned ac
     if (w->technique != PTI_TECHNIQUE_PLAIN && k->light_count > 0) {
         pti_mw asks = k->specular ? pti_mw_and(go, pti_lock_is(&s, PT_MATERIAL_DIFFUSE)) : go;
         if (facets) asks = pti_mw_or(asks, pti_mw_and(pti_mw_and(go, pti_fw_lt(zero, s.cosine)), facets->rough));
-        w->rays += (uint64_t)pti_lock_direct(k, &s, w->hits, facets, weight, asks, u, row, options->heuristic);
+        w->rays += (uint64_t)pti_lock_direct(k, &s, &w->met, facets, weight, asks, u, row, options->heuristic);
     }
     next = pti_lock_scatter(k, &s, facets, d, u, &weight, &density, row, &go);
     beta = pti_w3_mul(pti_row3(row + PTI_ROW_BETA), weight);
@@ -10825,8 +11063,9 @@ static unsigned pti_lock_vertex(pti_lock_work *w, pti_lane_row *row, unsigned ac
     if (options->roulette != PT_ROULETTE_NONE) go = pti_mw_and(go, pti_lock_roulette(options, row, &beta, u_roulette));
     pti_row3_set(row + PTI_ROW_BETA, beta);
     pti_row3_set(row + PTI_ROW_D, next);
-    if (k->tree) pti_lock_depart(row, w->hits, pti_mw_bits(go));
-    else pti_row3_set(row + PTI_ROW_O, pti_w3_along(s.ng, pti_lock_lift(k, &s, next), s.p));
+    next = pti_w3_along(s.ng, pti_lock_lift(k, &s, next), s.p);
+    if (k->tree) pti_lock_depart(row, &w->met, next, pti_mw_bits(go));
+    else pti_row3_set(row + PTI_ROW_O, next);
     row[PTI_ROW_DENSITY].f = density;
     row[PTI_ROW_EDGES].u = pti_uw_add(row[PTI_ROW_EDGES].u, pti_uw_set(1));
     return pti_mw_bits(go);
@@ -13353,6 +13592,7 @@ static int pti_pick_lockstep(const pt_method *method, const pt_scene *scene, con
 {
     const pt_camera *c = &d->camera;
     const pt_real ahead = c->lens_radius + c->near_distance * (1 + c->tan_half * (1 + (pt_real)d->width / (pt_real)d->height));
+    const pt_vec3 eye = pt_v3(pti_fabs(c->position.x) + ahead, pti_fabs(c->position.y) + ahead, pti_fabs(c->position.z) + ahead);
     *technique = PTI_TECHNIQUE_MIS;
 #if PTI_HAS_ALL_METHODS
     if (method->li == pt_li_path_plain) *technique = PTI_TECHNIQUE_PLAIN;
@@ -13366,8 +13606,8 @@ static int pti_pick_lockstep(const pt_method *method, const pt_scene *scene, con
 #endif
     if (d->no_lockstep || d->general_body || d->sampler == PT_SAMPLER_STRATIFIED) return 0;
     if (d->li.max_edges >= 1 << 24 || d->li.roulette_start >= 1 << 24) return 0; /* they are counted in floats */
-    if (pti_lockstep_make(out, scene, pt_v3(pti_fabs(c->position.x) + ahead, pti_fabs(c->position.y) + ahead, pti_fabs(c->position.z) + ahead))) return 1;
-    return pti_lockstep_make_tree(out, scene);
+    if (pti_lockstep_make(out, scene, eye)) return 1;
+    return pti_lockstep_make_tree(out, scene, eye);
 }
 #endif
 
@@ -14898,6 +15138,8 @@ PTDEF const pt_scene_entry *pt_scene_find(const char *name)
 /*
    VERSION HISTORY
 
+   0.6.0 (2026-11-23)  the walls of a room stand apart from the wide tree: every ray asks them first, and lockstep asks for
+                       them in lanes, so that meshes in rooms take about 0.6 of the time
    0.5.1 (2026-11-22)  lockstep mended: mirrors and glass seen from behind their shading normals, pictures that hung on
                        the size of tiles by a bit, rooms below 1e-15, small lamps far off.
    0.5.0 (2026-11-22)  paths walk in lockstep in scenes of any size, with metal, rough and smooth, and shading normals.

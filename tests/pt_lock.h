@@ -230,7 +230,15 @@ static inline void add_smooth_ball(pt_scene *s, double x, double y, double z, do
 /* What small scenes cannot have, where nobody sees it: then the scene's tree is asked. */
 static inline void add_speck(pt_scene *s, const place *at) { add_ball(s, at, 1.2, 0, 0, 0.0002, diffuse(s, 0.5, 0.5, 0.5)); }
 
-/* by_tree: with a speck. */
+/* So many triangles, where nobody sees them, that walls stand apart from a tree. */
+static inline void add_crowd(pt_scene *s, const place *at)
+{
+    const place far = {at->turn, 0.02 * at->scale, at->x + (at->turn > 0 ? 1.9 : 1.2) * at->scale, at->y, at->z};
+    int k, m = diffuse(s, 0.5, 0.5, 0.5);
+    for (k = 0; k < 6; k++) add_cube(s, QUAD, &far, -1, 1 + k, 1, m);
+}
+
+/* by_tree: 1: with a speck, 2: with a crowd. */
 static inline stage room_of(int kind, int by_tree)
 {
     const place turned = {0.6, 1, 0.2, 0.1, 0}, inside = {0.5, 1, 0.1, -0.3, -0.1}, *at = kind == MESH ? &turned : &HERE;
@@ -290,7 +298,8 @@ static inline stage room_of(int kind, int by_tree)
         add_smooth_ball(&s.scene, 0, 0.2, -0.6, 0.3, pt_add_material(&s.scene, pt_material_conductor(grey(1.5), grey(4), (pt_real)0.4)));
         add_smooth_ball(&s.scene, 0.1, -0.75, 0.3, 0.2, mirror);
     }
-    if (by_tree) add_speck(&s.scene, at);
+    if (by_tree == 1) add_speck(&s.scene, at);
+    if (by_tree == 2) add_crowd(&s.scene, at);
     commit(&s);
     return s;
 }

@@ -51,7 +51,8 @@ static void add_things(pt_scene *s, double lift, int m)
     add_ball(s, &HERE, 0.7, 0.5, lift > 0 ? -0.5 : -0.9, 0.18, m); /* and one is half in the wall         */
 }
 
-/* by_tree: it asks its tree; for that a speck is added, but where the scene has no choice as it is. */
+/* by_tree: it asks its tree; for that a speck is added, but where the scene has no choice as it is. 2: and lanes for its walls. */
+static const char *const TREE_NAMES[3] = {"", ", by its tree", ", tree and walls"};
 static stage furnace(int kind, double rho, int by_tree)
 {
     static const place places[FURNACES] = {{0, 1, 0, 0, 0},      {0, 1, 0.3, 0.2, 0.1}, {0.7, 1, 0, 0, 0},       {0.4, 1, 0, 0, 0}, {0.9, 1, 0.1, 0, -1},
@@ -71,7 +72,8 @@ static stage furnace(int kind, double rho, int by_tree)
     if (kind == SHELLS) add_ball(&s.scene, at, 0.1, 0, -0.2, 0.5, m);
     if (wedge) s.camera = camera_at(at, 0.9, 0.02, 0.5, 0, 0, 0.4, 0.1); /* it looks at the edge, on which a row of paths lands */
     if (kind == THINGS || kind == TOUCHING) add_things(&s.scene, kind == THINGS ? 0.05 : 0, m);
-    if (by_tree && kind != THIN_WEDGE) add_speck(&s.scene, at);
+    if (by_tree == 1 && kind != THIN_WEDGE) add_speck(&s.scene, at);
+    if (by_tree == 2) add_crowd(&s.scene, at);
     commit(&s);
     return s;
 }
@@ -82,7 +84,7 @@ static double walk_to_the_end(int kind, double rho, int k, uint32_t spp, int by_
 {
     const int width = 29, height = 23, touching = kind == TOUCHING || kind == THINGS;
     const double r = (double)(pt_real)rho, exact = (1 - pow(r, k)) / (1 - r), paths = (double)spp * width * height;
-    const char *name = label("%s%s, %d edges", furnace_names[kind], by_tree ? ", by its tree" : "", k);
+    const char *name = label("%s%s, %d edges", furnace_names[kind], TREE_NAMES[by_tree], k);
     stage s = furnace(kind, rho, by_tree);
     pt_render_desc d = desc_of(&s, width, height, spp);
     pt_film film;
@@ -106,6 +108,9 @@ static double walk_to_the_end(int kind, double rho, int k, uint32_t spp, int by_
     return (double)rays;
 }
 
+/* Do walls of it stand apart if it is crowded? */
+static int has_walls(int kind) { return kind != BALL && kind != SHELLS && kind != THIN_WEDGE; }
+
 static void no_way_out(void)
 {
     double edges = 0;
@@ -115,8 +120,135 @@ static void no_way_out(void)
         if (kind != THIN_WEDGE) edges += walk_to_the_end(kind, 0.999, 500, 2 * more, 0);
         if (WHOLE || kind == WEDGE) edges += walk_to_the_end(kind, 0.9, 10, kind == THIN_WEDGE ? 2 : 8 * few, kind == THIN_WEDGE);
         if (WHOLE || kind == FANS) edges += walk_to_the_end(kind, 0.999, 200, 2, 1);
+        if (WHOLE ? has_walls(kind) : kind == FANS) edges += walk_to_the_end(kind, 0.999, 200, 2 * more, 2);
     }
     printf("edges walked in closed scenes: %.4g\n", edges);
+}
+
+/* Rooms whose walls emit 1, reflect 0.9, and are asked in lanes; meshes in them, of albedo 1, are for the tree. No path leaves the
+   room, so that every one walks to the end; and none gets into a thing, where it would see no wall again: the first 40 walls
+   give 98 % of all light. But from less than e above a wall that a thing stands on, one path in a million edges may miss it. */
+enum { IN_THE_AIR, ON_THE_FLOOR, THROUGH_THE_FLOOR, BLOCK_ON_THE_FLOOR, FROM_WALL_TO_WALL, SHEET_ON_THE_FLOOR, HALF_OF_WALLS, FURNISHED };
+static const char *const furnished_names[FURNISHED] = {"a ball in the air", "a ball that touches the floor", "a ball through the floor", "a block on the floor",
+                                                       "a block from wall to wall", "a sheet 1e-5 above the floor", "a block, half of walls"};
+
+/* Sides of a box, of n x n quads, or, if they are low and n < 0, of one. */
+static void add_block(pt_scene *s, const place *at, const double low[3], const double high[3], int parts, int m)
+{
+    int axis, side, i, j, k;
+    for (axis = 0; axis < 3; axis++)
+        for (side = 0; side < 2; side++) {
+            const int n = parts > 0 ? parts : side ? -parts : 1;
+            for (i = 0; i < n; i++)
+                for (j = 0; j < n; j++) {
+                    const int a = (axis + 1 + !side) % 3, b = (axis + 1 + side) % 3;
+                    pt_vec3 v[4];
+                    for (k = 0; k < 4; k++) {
+                        double p[3];
+                        p[axis] = side ? high[axis] : low[axis];
+                        p[a] = low[a] + (high[a] - low[a]) * (i + (k == 1 || k == 2)) / n;
+                        p[b] = low[b] + (high[b] - low[b]) * (j + (k >= 2)) / n;
+                        v[k] = put(at, p, 1);
+                    }
+                    pt_add_quad(s, v[0], v[1], v[2], v[3], m);
+                }
+        }
+}
+
+/* A ball of triangles without normals of its own. */
+static void add_flat_ball(pt_scene *s, const place *at, double y, double r, int m)
+{
+    enum { AROUND = 24, UP = 12 };
+    int i, j, k;
+    for (j = 0; j < UP; j++)
+        for (i = 0; i < AROUND; i++) {
+            pt_vec3 v[4];
+            for (k = 0; k < 4; k++) {
+                const double a = 2 * PT_PI * ((i + (k == 1 || k == 2)) % AROUND) / AROUND, b = PT_PI * (j + (k >= 2)) / UP, w = j + (k >= 2) == UP ? 0 : sin(b);
+                const double p[3] = {r * w * cos(a), y + r * cos(b), r * w * sin(a)};
+                v[k] = put(at, p, 1);
+            }
+            if (j > 0) pt_add_triangle(s, v[0], v[1], v[2], m);
+            if (j + 1 < UP) pt_add_triangle(s, v[0], v[2], v[3], m);
+        }
+}
+
+/* refuse: something that leaves its walls to the tree. */
+enum { NOTHING, NORMALS, SHARP, MATERIALS, FAR_EYE, REFUSALS };
+static const char *const refusal_names[REFUSALS] = {"nothing", "shading normals", "a wedge of 2 degrees", "many materials", "a far eye"};
+
+/* Turned, they are far off, too: rounding is 140 times as large. */
+static stage furnished(int kind, double turn, double rho, int refuse)
+{
+    static const double on[3] = {-0.5, -1, -0.4}, block[3] = {0.4, -0.3, 0.5}, low_block[3] = {0.6, 0.1, 0.6}, low[3] = {-1, -1, -0.4}, high[3] = {1, -0.3, 0.5};
+    static const double sheet[2][3] = {{-0.7, -1 + 1e-5, -0.7}, {0.6, -1 + 2e-5, 0.8}};
+    const place at = {turn, 1, 200 * turn, -70 * turn, 100 * turn};
+    stage s;
+    int wall, m;
+    memset(&s, 0, sizeof s);
+    wall = material_of(&s.scene, pt_material_diffuse(grey(rho)), 1);
+    m = pt_add_material(&s.scene, pt_material_diffuse(grey(1)));
+    add_cube(&s.scene, PARALLELOGRAM, &at, -1, 1, 0, wall);
+    if (kind <= THROUGH_THE_FLOOR) add_flat_ball(&s.scene, &at, kind == IN_THE_AIR ? 0 : kind == ON_THE_FLOOR ? -0.5 : -0.7, 0.5, m);
+    if (kind == BLOCK_ON_THE_FLOOR) add_block(&s.scene, &at, on, block, 4, m);
+    if (kind == FROM_WALL_TO_WALL) add_block(&s.scene, &at, low, high, 5, m);
+    if (kind == HALF_OF_WALLS) add_block(&s.scene, &at, on, low_block, -6, m);
+    if (kind == SHEET_ON_THE_FLOOR) add_block(&s.scene, &at, sheet[0], sheet[1], 5, m);
+    if (refuse == NORMALS) {
+        const pt_vec3 v[3] = {v3(-0.9, 0.9, -0.9), v3(0.9, 0.9, -0.9), v3(0, 0.9, 0.9)}, n[3] = {v3(0.1, -1, 0), v3(0, -1, 0), v3(0, -1, 0.1)};
+        const uint32_t index[3] = {0, 1, 2};
+        pt_add_mesh(&s.scene, v, n, NULL, 3, index, 1, m);
+    }
+    if (refuse == SHARP) pt_add_quad(&s.scene, v3(-1, -1, -1), v3(-1, -1, 1), v3(1, -0.93, 1), v3(1, -0.93, -1), m);
+    while (refuse == MATERIALS && s.scene.material_count < 60) diffuse(&s.scene, 0.1, 0.1, 0.1);
+    s.camera = camera_at(&at, 0.1, 0.5, 0.8, 0, -0.3, -1, 70);
+    commit(&s);
+    return s;
+}
+
+static void walls_left_to_the_tree(void)
+{
+    int i;
+    for (i = 0; i < REFUSALS; i++) {
+        stage s = furnished(IN_THE_AIR, 0, 0.9, i);
+        pti_lockstep ready;
+        memset(&ready, 0, sizeof ready);
+        pt_check(pti_lockstep_make_tree(&ready, &s.scene, v3(1, 1, i == FAR_EYE ? 1e5 : 1)) && ready.walls == (i ? 0 : 6), refusal_names[i], "%d walls are for lanes", ready.walls);
+        pt_scene_free(&s.scene);
+    }
+}
+
+static void furnished_rooms(void)
+{
+    const int k = 200, width = 29, height = 23;
+    const uint32_t spp = pt_test.is_short ? 2 : WHOLE ? 10 : 4;
+    double edges = 0;
+    int kind, turned;
+    for (kind = 0; kind < FURNISHED; kind++)
+        for (turned = 0; turned < 2; turned++) {
+            const char *name = label("%s%s", furnished_names[kind], turned ? ", turned" : "");
+            stage s = furnished(kind, 0.7 * turned, 0.9, NOTHING);
+            pt_render_desc d = desc_of(&s, width, height, spp);
+            const double r = (double)(pt_real)0.9, most = spp / 2 / (1 - r), all = (double)spp * width * height * k;
+            const double loss = kind == IN_THE_AIR ? 0 : 1e-6;
+            pti_lockstep ready;
+            pt_film film;
+            uint64_t rays;
+            int wrong = 0, i;
+            memset(&ready, 0, sizeof ready);
+            pt_check(pti_lockstep_make_tree(&ready, &s.scene, v3(1, 1, 1)) && ready.walls == (kind == HALF_OF_WALLS ? 9 : 6), name, "%d walls are for lanes", ready.walls);
+            d.method = "path-plain";
+            d.li.max_edges = k;
+            d.li.roulette = PT_ROULETTE_NONE;
+            film = render(&s, &d, 2, &rays);
+            pt_check((double)rays <= all && (double)rays >= (1 - loss * k) * all, name, "%.0f of %.0f edges are missing", all - (double)rays, all);
+            for (i = 0; i < 3 * width * height; i++) wrong += !(fmin(film.half[0][i], film.half[1][i]) > 0.98 * most && fmax(film.half[0][i], film.half[1][i]) < 1.00001 * most);
+            pt_check(wrong <= 3 * loss * all, name, "%d pixels have less or more than all light", wrong);
+            edges += (double)rays;
+            pt_film_free(&film);
+            pt_scene_free(&s.scene);
+        }
+    printf("edges walked in furnished rooms: %.4g\n", edges);
 }
 
 /* Paths that end by roulette: 1 / (1 - rho) in the mean. Light sampling alone has no variance where walls meet, so it is asked
@@ -129,8 +261,8 @@ static void furnace_mean(int kind, double rho, const char *method, int max_edges
     picture p;
     d.method = method;
     d.li.max_edges = max_edges;
-    p = pictures(&s, d, RENDERS, 1000u + 10000u * (uint64_t)kind, 1 + by_tree);
-    pt_check_mean(label("%s, rho %g, %s%s%s", furnace_names[kind], rho, method, max_edges ? ", 5 edges" : "", by_tree ? ", by its tree" : ""), &p.whole, exact, 4 * PTI_2_M24 * exact,
+    p = pictures(&s, d, RENDERS, 1000u + 10000u * (uint64_t)kind, 1 + (by_tree > 0));
+    pt_check_mean(label("%s, rho %g, %s%s%s", furnace_names[kind], rho, method, max_edges ? ", 5 edges" : "", TREE_NAMES[by_tree]), &p.whole, exact, 4 * PTI_2_M24 * exact,
                   bound, PT_TEST_MEANS, "light is lost or counted twice");
     pt_scene_free(&s.scene);
 }
@@ -147,6 +279,7 @@ static void furnaces(void)
         if (kind == BOX) furnace_mean(kind, 0.999, "path", 0, 1, 0.1, 0);
         if (kind == FANS) furnace_mean(kind, 0.999, "path-plain", 0, 1, 0.1, 0);
         if (kind == TURNED || kind == THINGS || kind == SHELLS) furnace_mean(kind, 0.5, "path", 0, 60, 0.01, 1);
+        if (kind == TURNED || kind == THINGS || kind == FANS) furnace_mean(kind, 0.5, "path", 0, 60, 0.01, 2);
     }
 }
 
@@ -219,9 +352,10 @@ static void backwards(void *user, int count, void (*task)(void *context, int ind
 
 static void same_bits(void)
 {
-    static const int threads[3] = {1, 2, 7}, tile[4] = {1, 5, 16, 64}, kinds[3] = {SPHERES, MANY_LAMPS, GLOWING};
+    static const int threads[3] = {1, 2, 7}, tile[4] = {1, 5, 16, 64}, kinds[4] = {SPHERES, MANY_LAMPS, GLOWING, SMOOTH};
     int r, i, k;
-    for (r = 0; r < 3; r++) {
+    for (r = 0; r < 4; r++) {
+        const int body = r < 3 ? 1 : 2;
         stage s = room(kinds[r]);
         pt_render_desc d = desc_of(&s, 37, 19, 7);
         pt_film first, other;
@@ -229,24 +363,25 @@ static void same_bits(void)
         if (r == 1) d.sampler = PT_SAMPLER_INDEPENDENT;
         if (r == 2) d.single_net = 1;
         if (r == 2) d.camera.lens_radius = (pt_real)0.02;
-        first = render(&s, &d, 1, &rays);
+        if (kinds[r] == SMOOTH) d.li.max_edges = 24;
+        first = render(&s, &d, body, &rays);
         for (i = 0; i < 3; i++)
             for (k = 0; k < 4; k++) {
                 const char *name = label("%s, %d threads, tiles of %d", room_names[kinds[r]], threads[i], tile[k]);
                 d.threads = threads[i];
                 d.tile = tile[k];
-                other = render(&s, &d, 1, &again);
+                other = render(&s, &d, body, &again);
                 pt_check(same_film(&first, &other), name, "the films differ");
                 pt_check(again == rays, name, "%.0f rays instead of %.0f: empty lanes count", (double)again, (double)rays);
                 pt_film_free(&other);
             }
         d.tile = 6;
         d.parallel = backwards;
-        other = render(&s, &d, 1, NULL);
+        other = render(&s, &d, body, NULL);
         pt_check(same_film(&first, &other), room_names[kinds[r]], "the films differ if the last tile comes first");
         pt_film_free(&other);
         d.seed++;
-        other = render(&s, &d, 1, NULL);
+        other = render(&s, &d, body, NULL);
         pt_check(memcmp(first.half[0], other.half[0], 3 * sizeof(double) * 37 * 19) != 0, room_names[kinds[r]], "another seed changes nothing");
         pt_film_free(&other);
         pt_film_free(&first);
@@ -1294,7 +1429,7 @@ static void shadows(void)
                 pti_lock_ask(&ready, pti_row3(o), pti_row3(d), ready.e, &best, 0);
                 landed[end] = pti_mw_bits(pti_fw_lt(best.t, pti_fw_set(PTI_LOCK_FAR)));
                 surface.met = pti_mw_of_bits(landed[end]);
-                pti_lock_land(&ready, pti_row3(o), pti_row3(d), &best, &surface);
+                pti_lock_face(&ready, &surface, pti_lock_land(&ready, pti_row3(o), pti_row3(d), &best, &surface), pti_row3(d));
                 pti_row3_set(normal[end], surface.n);
                 pti_row3_set(q[end], pti_w3_along(surface.n, pti_lock_lift(&ready, &surface, surface.n), surface.p));
             }
@@ -1409,13 +1544,15 @@ static void refused(void)
 /* The auxiliary pictures are those of the same camera rays, one at a time; to ask for them changes no bit of the picture. */
 static void layers_of(int kind)
 {
+    const int body = kind == SMOOTH ? 2 : 1;
     stage s = room(kind);
     pt_render_desc d = desc_of(&s, 40, 30, 8);
     pt_film film, plain, without;
     int i, same, hits = 0, off = 0;
-    without = render(&s, &d, 1, NULL);
+    if (kind == SMOOTH) d.li.max_edges = 24; /* shading normals can keep a path in a ball of glass for ever */
+    without = render(&s, &d, body, NULL);
     d.aov = 1;
-    film = render(&s, &d, 1, NULL);
+    film = render(&s, &d, body, NULL);
     d.no_lockstep = 1;
     plain = render(&s, &d, 0, NULL);
     same = memcmp(film.half[0], without.half[0], 3600 * sizeof(double)) == 0 && memcmp(film.half[1], without.half[1], 3600 * sizeof(double)) == 0;
@@ -1439,6 +1576,7 @@ static void layers(void)
 {
     layers_of(SPHERES);
     layers_of(IN_GLASS); /* seen from behind */
+    layers_of(SMOOTH); /* by its tree, and walls in lanes */
 }
 
 /* A square of side 2 about (0, y, 0) with shading normals 60 degrees off its own, towards x. up: does it look up? */
@@ -1651,6 +1789,7 @@ static int lockstep(int argc, char **argv)
     pt_check(PTI_WIDTH == LOCK_WIDTH && PTI_LANES == LOCK_LANES, "lanes", "%d, and lanes of 8 of kind %d: not what this program is for", PTI_WIDTH, PTI_LANES);
 #endif
     PT_TEST_EXACT(no_way_out);
+    PT_TEST_EXACT(furnished_rooms);
     if (WHOLE) {
         PT_TEST(furnaces);
         PT_TEST(irradiance);
@@ -1661,6 +1800,7 @@ static int lockstep(int argc, char **argv)
         PT_TEST_EXACT(refused);
         PT_TEST_EXACT(layers);
         PT_TEST_EXACT(taken);
+        PT_TEST_EXACT(walls_left_to_the_tree);
         PT_TEST_EXACT(behind_surfaces);
         PT_TEST_EXACT(behind_normals);
         PT_TEST_EXACT(alone);
