@@ -10286,6 +10286,15 @@ PTI_INLINE8 pti_mw pti_lock_ask(const pti_lockstep *k, pti_w3 o, pti_w3 d, float
     return pti_lock_balls(k, o, d, best, met, how);
 }
 
+/* Is there something before t that blocks? */
+static pti_mw pti_lock_any(const pti_lockstep *k, pti_w3 o, pti_w3 d, pti_fw t)
+{
+    pti_lock_best end;
+    end.t = t;
+    end.i = end.margin = end.key = pti_fw_set(0);
+    return pti_lock_ask(k, o, d, k->e, &end, PTI_LOCK_ANY);
+}
+
 /* The nearest hits. Only lanes that need it take the careful answer: what a lane finds is its own matter. */
 static void pti_lock_nearest(const pti_lockstep *k, pti_w3 o, pti_w3 d, float e, pti_lock_best *best)
 {
@@ -10577,10 +10586,7 @@ static pti_mw pti_lock_blocked(const pti_lockstep *k, const pti_lock_met *met, u
     pti_lane_row from[3], to[3], d[3];
     unsigned blocked = 0;
     if (k->walls > 0) {
-        pti_lock_best end;
-        end.t = distance;
-        end.i = end.margin = end.key = pti_fw_set(0);
-        blocked = active & pti_mw_bits(pti_lock_ask(k, o, w, k->e, &end, PTI_LOCK_ANY));
+        blocked = active & pti_mw_bits(pti_lock_any(k, o, w, distance));
         active &= ~blocked & pti_lock_boxed(k, o, w, k->e, distance);
     }
     pti_row3_set(from, o);
@@ -10860,7 +10866,6 @@ PTI_INLINE8 int pti_lock_direct(const pti_lockstep *k, const pti_lock_surface *s
     pti_fw number = zero, density, distance2, distance, here, there, p, other, weight;
     pti_w3 q, n, w, to, value;
     pti_mw flat = pti_mw_of_bits(~0u);
-    pti_lock_best end;
     pti_uw light;
     int i, rays;
     for (i = 1; i < k->light_count; i++) number = pti_fw_select(pti_fw_le(pti_fw_set(k->chosen[i]), u->which), pti_fw_set((float)i), number);
@@ -10884,8 +10889,6 @@ PTI_INLINE8 int pti_lock_direct(const pti_lockstep *k, const pti_lock_surface *s
     if (k->shading) active = pti_mw_and(active, pti_fw_lt(zero, pti_w3_dot(s->ng, w)));
     rays = pti_count_bits(pti_mw_bits(active));
     if (rays == 0) return 0;
-    end.t = distance;
-    end.i = end.margin = end.key = zero;
     other = pti_fw_mul(here, pti_fw_set((float)(1 / PT_PI)));
     value = pti_w3_scale(albedo, other);
     if (f && pti_mw_bits(f->rough)) {
@@ -10896,7 +10899,7 @@ PTI_INLINE8 int pti_lock_direct(const pti_lockstep *k, const pti_lock_surface *s
         other = pti_fw_select(some, of_facets, other);
     }
     weight = pti_fw_div(pti_lock_weight(p, other, heuristic), p);
-    weight = pti_fw_select(k->tree ? pti_lock_blocked(k, met, pti_mw_bits(active), o, q, w, distance) : pti_lock_ask(k, o, w, k->e, &end, PTI_LOCK_ANY), zero, weight);
+    weight = pti_fw_select(k->tree ? pti_lock_blocked(k, met, pti_mw_bits(active), o, q, w, distance) : pti_lock_any(k, o, w, distance), zero, weight);
     weight = pti_fw_select(active, weight, zero);
     value = pti_w3_mul(value, pti_w3_mul(pti_row3(row + PTI_ROW_BETA), pti_lit3(k, PTI_LIT_EMISSION, light)));
     pti_row3_set(row + PTI_ROW_SUM, pti_w3_along(value, weight, pti_row3(row + PTI_ROW_SUM)));
