@@ -4943,7 +4943,8 @@ static uint32_t pti_write_flat(const pt_scene *scene, pti_small *out, uint32_t l
 }
 
 /* Planes of a list of flat primitives, then all spheres from primitive `sphere` up to `end`. */
-static void pti_write_apart(const pt_scene *scene, pt_wide *wide, pti_small *out, const uint32_t *list, uint32_t flats, uint32_t sphere, uint32_t end)
+static void pti_write_apart(const pt_scene *scene, pt_wide *wide, pti_small *out, const uint32_t *list, uint32_t flats,
+                            uint32_t sphere, uint32_t end)
 {
     uint32_t i, lane = 0;
     for (i = 0; i < 2 * PTI_SMALL; i++) out->tag[i / 8].bits[i % 8] = i;
@@ -5938,7 +5939,8 @@ PTI_INLINE int pti_search_wide(const pt_scene *scene, const pti_ray *r, pti_best
 {
     pti_ray8 w;
     if (!pti_ray8_make(&w, r, scene->wide.extent)) return -1;
-    if (scene->wide.plane_blocks + scene->wide.sphere_blocks == 0) return pti_traverse_wide(scene, r, &w, pti_ray8_limit(&w, best->t), best, any);
+    if (scene->wide.plane_blocks + scene->wide.sphere_blocks == 0)
+        return pti_traverse_wide(scene, r, &w, pti_ray8_limit(&w, best->t), best, any);
     return any ? pti_any_apart(scene, r, &w, best) : pti_nearest_apart(scene, r, &w, best);
 }
 
@@ -10059,6 +10061,13 @@ static double pti_lock_extent(const pt_scene *scene)
                 pti_max3((double)scene->hi.x, (double)scene->hi.y, (double)scene->hi.z));
 }
 
+/* Has a primitive shading normals? */
+static int pti_lock_smooth(const pt_scene *scene, uint32_t i)
+{
+    const pt_primitive *p = &scene->primitives[i];
+    return p->shape == PT_SHAPE_TRIANGLE && scene->meshes[scene->triangles[p->index].mesh].has_normals;
+}
+
 /* The walls that stand apart from the scene's tree, and the corners of its box in two items more; 0: not all are items, or some have
    shading normals. */
 static int pti_lock_collect_walls(const pt_scene *scene, pti_lock_item *items)
@@ -10068,10 +10077,9 @@ static int pti_lock_collect_walls(const pt_scene *scene, pti_lock_item *items)
     int lane, count = 0, k;
     for (lane = 0; lane < 8 * scene->wide.plane_blocks; lane++) {
         const uint32_t id = (uint32_t)small->tested[lane].id, other = (uint32_t)small->tested[PTI_SMALL + lane].id;
-        const pt_primitive *p = &scene->primitives[id];
-        if (!(small->planes[lane / 8].steep[lane % 8] > 0)) continue; /* no one's */
+        if (small->planes[lane / 8].steep[lane % 8] == 0) continue; /* no one's */
         if (pti_lock_collect(scene, id, (double)scene->wide.extent, &items[count++]) != 1 + (id != other)) return 0;
-        if (p->shape == PT_SHAPE_TRIANGLE && scene->meshes[scene->triangles[p->index].mesh].has_normals) return 0;
+        if (pti_lock_smooth(scene, id) || pti_lock_smooth(scene, other)) return 0;
     }
     for (k = 0; k < 2; k++) {
         const pt_real z = k ? b.z : a.z;
@@ -10106,7 +10114,7 @@ static void pti_lock_write_box(pti_lockstep *k, const pt_wide *tree)
 static void pti_lockstep_make_walls(pti_lockstep *k, const pt_scene *scene, pt_vec3 eye, double smallest)
 {
     const double x = pti_lock_extent(scene), from = fmax(x, pti_max3((double)eye.x, (double)eye.y, (double)eye.z));
-    pti_lock_item items[2 * PTI_WALLS + 2];
+    pti_lock_item items[PTI_WALLS + 2];
     pti_lockstep all = *k;
     int count, i;
     if (!scene->wide.tree || scene->wide.plane_blocks == 0 || (scene->wide.root & 7) != PTI_NODE) return;
@@ -10581,7 +10589,8 @@ static pti_d3 pti_lock_origin(const pti_lock_met *met, int lane, const pti_lane_
 
 /* Shadow rays in a scene with a tree, from hits (o for lanes) to points q of lights that are moved off: the lanes that something
    blocks. */
-static pti_mw pti_lock_blocked(const pti_lockstep *k, const pti_lock_met *met, unsigned active, pti_w3 o, pti_w3 q, pti_w3 w, pti_fw distance)
+static pti_mw pti_lock_blocked(const pti_lockstep *k, const pti_lock_met *met, unsigned active, pti_w3 o, pti_w3 q, pti_w3 w,
+                               pti_fw distance)
 {
     pti_lane_row from[3], to[3], d[3];
     unsigned blocked = 0;
@@ -10858,14 +10867,14 @@ PTI_INLINE8 pti_fw pti_lock_flat_point(const pti_lockstep *k, pti_uw light, cons
 }
 
 /* Asks a point of a light for its light; how many rays that took. met: for trees; f: NULL where nothing is rough. */
-PTI_INLINE8 int pti_lock_direct(const pti_lockstep *k, const pti_lock_surface *s, const pti_lock_met *met, const pti_lock_facets *f, pti_w3 albedo,
-                               pti_mw active, const pti_lock_numbers *u, pti_lane_row *row, pt_heuristic heuristic)
+PTI_INLINE8 int pti_lock_direct(const pti_lockstep *k, const pti_lock_surface *s, const pti_lock_met *met, const pti_lock_facets *f,
+                               pti_w3 albedo, pti_mw active, const pti_lock_numbers *u, pti_lane_row *row, pt_heuristic heuristic)
 {
     const pti_fw zero = pti_fw_set(0);
     const pti_w3 o = pti_w3_along(s->ng, pti_lock_lift(k, s, s->ng), s->p);
     pti_fw number = zero, density, distance2, distance, here, there, p, other, weight;
     pti_w3 q, n, w, to, value;
-    pti_mw flat = pti_mw_of_bits(~0u);
+    pti_mw flat = pti_mw_of_bits(~0u), blocked;
     pti_uw light;
     int i, rays;
     for (i = 1; i < k->light_count; i++) number = pti_fw_select(pti_fw_le(pti_fw_set(k->chosen[i]), u->which), pti_fw_set((float)i), number);
@@ -10899,8 +10908,8 @@ PTI_INLINE8 int pti_lock_direct(const pti_lockstep *k, const pti_lock_surface *s
         other = pti_fw_select(some, of_facets, other);
     }
     weight = pti_fw_div(pti_lock_weight(p, other, heuristic), p);
-    weight = pti_fw_select(k->tree ? pti_lock_blocked(k, met, pti_mw_bits(active), o, q, w, distance) : pti_lock_any(k, o, w, distance), zero, weight);
-    weight = pti_fw_select(active, weight, zero);
+    blocked = k->tree ? pti_lock_blocked(k, met, pti_mw_bits(active), o, q, w, distance) : pti_lock_any(k, o, w, distance);
+    weight = pti_fw_select(active, pti_fw_select(blocked, zero, weight), zero);
     value = pti_w3_mul(value, pti_w3_mul(pti_row3(row + PTI_ROW_BETA), pti_lit3(k, PTI_LIT_EMISSION, light)));
     pti_row3_set(row + PTI_ROW_SUM, pti_w3_along(value, weight, pti_row3(row + PTI_ROW_SUM)));
     return rays;
