@@ -916,12 +916,12 @@ typedef enum pt_tree {
 /* A tree of eight children a node over all primitives of a scene; made and freed with it. */
 typedef struct pt_wide {
     void *memory;
-    unsigned char *arena;    /* what stands apart, then nodes and leaves, within memory                    */
+    unsigned char *arena;    /* nodes and leaves, within memory                                            */
     size_t bytes;            /* of the arena; 0 = no tree                                                  */
-    uint32_t root;
+    uint32_t root, things;   /* of all, and of all but walls                                               */
     uint32_t triangles;      /* primitives below this number are triangles                                 */
-    int tree;                /* 0: no nodes and leaves, as all primitives stand apart                      */
-    int plane_blocks, sphere_blocks; /* of what stands apart: the walls of a room, all of a small scene    */
+    uint32_t wall_count, walls[32]; /* large flat primitives, if there are no more of them                 */
+    int plane_blocks, sphere_blocks; /* a small scene has these instead of a tree                          */
     float extent;            /* the largest coordinate, in magnitude                                       */
 } pt_wide;
 #endif
@@ -4828,10 +4828,9 @@ static void *pti_alloc_lines(size_t bytes, void **memory, void *user)
     return lines;
 }
 
-/* WHAT STANDS APART. Up to 64 primitives need no tree: every lane says where its primitive may begin, no later than the hit, and
+/* SMALL SCENES. Up to 64 primitives need no tree: every lane says where its primitive may begin, no later than the hit, and
    primitives are tested by [PT-06] in that order, until what is left begins behind the nearest hit. That is one test for most
-   rays, and no branch that depends on the ray but the last. In larger scenes the walls, which nearly every ray asks anyway and
-   whose boxes would blow up those of a tree, stand apart, too: they are asked first and bound how far the tree is walked.
+   rays, and no branch that depends on the ray but the last.
 
    Memory is no matter here, so a lane keeps what saves time: the plane of its primitive and the weights of a point in it,
    as linear functions of the point. Two triangles in a row that make a parallelogram share a lane, as the sides of rooms and
@@ -4916,24 +4915,24 @@ static void pti_write_plane(pti_plane8 *out, uint32_t i, const pt_vec3 *c, int c
     out->both[i] = corners == 4;
 }
 
-/* Lane `lane` from entry i of a list of `count` flat primitives on; how many it takes. */
-static uint32_t pti_write_flat(const pt_scene *scene, pti_small *out, uint32_t lane, const uint32_t *list, uint32_t i, uint32_t count)
+/* Lane `lane` from primitive i on; how many it takes. */
+static uint32_t pti_write_flat(const pt_scene *scene, pti_small *out, uint32_t lane, uint32_t i, uint32_t flats)
 {
     pti_tested *a = &out->tested[lane], *b = &out->tested[PTI_SMALL + lane];
     pti_plane8 *plane = &out->planes[lane / 8];
-    const int there = i < count;
+    const int there = i < flats;
     pt_vec3 c[4], d[4], all[4];
     int corners;
-    a->id = b->id = (int)list[there ? i : count - 1];
+    a->id = b->id = (int)(there ? i : flats - 1);
     corners = pti_corners(scene, &scene->primitives[a->id], c);
     a->half = corners == 4 ? 1 : 0;
     b->half = 2 * a->half;
     memcpy(a->corner, c, sizeof a->corner);
     memcpy(b->corner, c, sizeof b->corner);
     if (b->half) memcpy(b->corner + 1, c + 2, 2 * sizeof *c);
-    if (corners == 3 && i + 1 < count && pti_corners(scene, &scene->primitives[list[i + 1]], d) == 3 &&
+    if (corners == 3 && i + 1 < flats && pti_corners(scene, &scene->primitives[i + 1], d) == 3 &&
         pti_is_parallelogram(c, d, (double)scene->wide.extent, all)) {
-        b->id = (int)list[i + 1];
+        b->id++;
         memcpy(b->corner, d, sizeof b->corner);
         pti_write_plane(plane, lane % 8, all, 4, 1);
         return 2;
@@ -4942,36 +4941,30 @@ static uint32_t pti_write_flat(const pt_scene *scene, pti_small *out, uint32_t l
     return 1;
 }
 
-/* Planes of a list of flat primitives, then all spheres from primitive `sphere` up to `end`. */
-static void pti_write_apart(const pt_scene *scene, pt_wide *wide, pti_small *out, const uint32_t *list, uint32_t flats,
-                            uint32_t sphere, uint32_t end)
-{
-    uint32_t i, lane = 0;
-    for (i = 0; i < 2 * PTI_SMALL; i++) out->tag[i / 8].bits[i % 8] = i;
-    for (i = 0; i < flats || lane % 8 > 0; lane++) i += pti_write_flat(scene, out, lane, list, i, flats);
-    wide->plane_blocks = (int)(lane / 8);
-    for (i = 0; sphere + i < end || i % 8 > 0; i++, lane++) {
-        const uint32_t id = sphere + i < end ? sphere + i : end - 1;
-        out->tested[lane].id = out->tested[PTI_SMALL + lane].id = (int)id;
-        pti_write_sphere(scene, &out->spheres[i / 8], i % 8, id, sphere + i < end);
-    }
-    wide->sphere_blocks = (int)(i / 8);
-}
-
-/* All of a small scene, the first `flats` of which are flat. 0 = no memory. */
+/* Planes of `flats` primitives, then spheres. 0 = no memory. */
 static int pti_build_small(const pt_scene *scene, pt_wide *wide, uint32_t flats)
 {
-    uint32_t list[PTI_SMALL], i;
-    wide->arena = (unsigned char *)pti_alloc_lines(sizeof(pti_small), &wide->memory, scene->alloc_user);
-    if (!wide->arena) return 0;
-    wide->bytes = sizeof(pti_small);
-    for (i = 0; i < flats; i++) list[i] = i;
-    pti_write_apart(scene, wide, (pti_small *)(void *)wide->arena, list, flats, flats, scene->primitive_count);
+    const uint32_t count = scene->primitive_count;
+    pti_small *out = (pti_small *)pti_alloc_lines(sizeof *out, &wide->memory, scene->alloc_user);
+    uint32_t i, lane = 0;
+    if (!out) return 0;
+    wide->arena = (unsigned char *)out;
+    wide->bytes = sizeof *out;
+    for (i = 0; i < 2 * PTI_SMALL; i++) out->tag[i / 8].bits[i % 8] = i;
+    for (i = 0; i < flats || lane % 8 > 0; lane++) i += pti_write_flat(scene, out, lane, i, flats);
+    wide->plane_blocks = (int)(lane / 8);
+    for (i = 0; flats + i < count || i % 8 > 0; i++, lane++) {
+        const uint32_t id = flats + i < count ? flats + i : count - 1;
+        out->tested[lane].id = out->tested[PTI_SMALL + lane].id = (int)id;
+        pti_write_sphere(scene, &out->spheres[i / 8], i % 8, id, flats + i < count);
+    }
+    wide->sphere_blocks = (int)(i / 8);
     return 1;
 }
 
 /* BUILDING. First a binary tree as in [PT-07], by the surface area heuristic with bins; but eight triangles cost what one
-   does, so a side costs its area times ceil(n / 8), and eight are a leaf. Then, of all ways in which nodes of up to eight
+   does, so a side costs its area times ceil(n / 8), and eight are a leaf, but for large ones: walls are better off apart, and
+   are parted from the rest first. Then, of all ways in which nodes of up to eight
    children can be cut from that tree, the one whose nodes and leaves have the least area together: with c(n, k) the least cost
    of subtree n in at most k slots of a parent [Yli17],
 
@@ -4983,8 +4976,9 @@ static int pti_build_small(const pt_scene *scene, pt_wide *wide, uint32_t flats)
 #define PTI_WIDE_BINS 16
 #define PTI_PIECES 256
 #define PTI_WIDE_DEPTH 32   /* deeper down lists are halved, and end within 28 levels                      */
-#define PTI_SIDE 4          /* no side of a plane has fewer boxes                                          */
-#define PTI_APART 0.03f     /* flat primitives whose box has a 100th of the surface of a cube around the scene stand apart, */
+#define PTI_TOP 8           /* from this depth on no side of a plane has less than four boxes              */
+#define PTI_CUT 0.1f        /* a leaf of more than a 30th of the surface of a cube around the scene is cut where that pays */
+#define PTI_WALL 0.03f      /* flat primitives whose box has a 100th of the surface of a cube around the scene are walls, */
 #define PTI_WALLS 32        /* unless there are more of them                                               */
 #define PTI_FEW 33          /* for lists that are shorter, half of the bins do                             */
 
@@ -5014,10 +5008,9 @@ typedef struct pti_wide_builder {
     unsigned char *arena;   /* NULL while bytes are counted                                                */
     size_t used;            /* bytes of it                                                                 */
     pti_counter next;       /* node                                                                        */
-    float apart;            /* half of the surface of what stands apart                                    */
+    float wall, cut;        /* half of the surface of a wall's box, and of a leaf that is cut              */
     uint32_t triangles, flats; /* lanes below these hold triangles, triangles and halves                   */
-    uint32_t lanes, flat_lanes; /* in the tree, and how many of them hold what is flat                     */
-    uint32_t walls, list[PTI_WALLS]; /* primitives that stand apart                                        */
+    uint32_t walls;         /* the first boxes are these lanes' of walls                                   */
     uint32_t piece_size;
     int piece_count;
     pti_piece pieces[PTI_PIECES];
@@ -5042,8 +5035,8 @@ typedef struct pti_wide_bins {
     uint32_t count[PTI_WIDE_BINS];
 } pti_wide_bins;
 
-/* The best plane between `count` bins of an axis, if it is better than *best. */
-static void pti_sweep_blocks(const pti_wide_bins *bins, int count, pti_parting p, pti_parting *best)
+/* The best plane between `count` bins of an axis, if it is better than *best; `few` boxes at least on each side. */
+static void pti_sweep_blocks(const pti_wide_bins *bins, int count, uint32_t few, pti_parting p, pti_parting *best)
 {
     float right[PTI_WIDE_BINS];
     pti_lanes box;
@@ -5053,13 +5046,13 @@ static void pti_sweep_blocks(const pti_wide_bins *bins, int count, pti_parting p
     for (i = count - 1; i > 0; i--) {
         box.f = pti_f8_max(box.f, bins->box[i].f);
         n += bins->count[i];
-        right[i] = n >= PTI_SIDE ? pti_box_area(box.v) * (float)((n + 7) / 8) : HUGE_VALF;
+        right[i] = n >= few ? pti_box_area(box.v) * (float)((n + 7) / 8) : HUGE_VALF;
     }
     box.f = pti_f8_set(-HUGE_VALF);
     for (n = 0, i = 1; i < count; i++) {
         box.f = pti_f8_max(box.f, bins->box[i - 1].f);
         n += bins->count[i - 1];
-        if (n < PTI_SIDE) continue;
+        if (n < few) continue;
         p.cost = pti_box_area(box.v) * (float)((n + 7) / 8) + right[i];
         p.plane = (float)i;
         if (p.cost < best->cost) *best = p;
@@ -5067,7 +5060,7 @@ static void pti_sweep_blocks(const pti_wide_bins *bins, int count, pti_parting p
 }
 
 /* Improves on *best, a halving of infinite cost, if the centres differ. */
-static void pti_find_parting(const pti_wide_builder *b, uint32_t begin, uint32_t end, const float *centres, pti_parting *best)
+static void pti_find_parting(const pti_wide_builder *b, uint32_t begin, uint32_t end, const float *centres, uint32_t few, pti_parting *best)
 {
     const int count = end - begin < PTI_FEW ? PTI_WIDE_BINS / 2 : PTI_WIDE_BINS;
     pti_wide_bins bins[3];
@@ -5101,7 +5094,7 @@ static void pti_find_parting(const pti_wide_builder *b, uint32_t begin, uint32_t
         }
     }
     for (k = 0; k < 3; k++)
-        if (p[k].scale > 0) pti_sweep_blocks(&bins[k], count, p[k], best);
+        if (p[k].scale > 0) pti_sweep_blocks(&bins[k], count, few, p[k], best);
 }
 
 /* Moves what goes left to the front, without branches, and joins both sides; returns the first of the right. */
@@ -5110,7 +5103,7 @@ static uint32_t pti_part(pti_wide_builder *b, uint32_t begin, uint32_t end, cons
     const pti_f8 none = pti_f8_set(-HUGE_VALF);
     const int k = p->axis < 0 ? 0 : p->axis;
     pti_f8 left_box = none, left_centres = none, right_box = none, right_centres = none;
-    uint32_t i, left = begin;
+    uint32_t i, to, left = begin;
     for (i = begin; i < end; i++) {
         const pti_lanes box = b->boxes[i];
         const float place = p->axis < 0 ? (i - begin < p->middle ? -1.0f : 1.0f) : (box.v[4 + k] - box.v[k] - p->lo) * p->scale;
@@ -5120,8 +5113,9 @@ static uint32_t pti_part(pti_wide_builder *b, uint32_t begin, uint32_t end, cons
         right_box = pti_f8_max(right_box, pti_f8_select(goes_left, none, box.f));
         left_centres = pti_f8_max(left_centres, pti_f8_select(goes_left, centre, none));
         right_centres = pti_f8_max(right_centres, pti_f8_select(goes_left, none, centre));
-        b->boxes[i] = b->boxes[left];
-        b->boxes[left] = box;
+        to = p->axis < 0 ? i : left; /* the first `middle` are in front as they are */
+        b->boxes[i] = b->boxes[to];
+        b->boxes[to] = box;
         left += place < p->plane;
     }
     side[0].box.f = left_box;
@@ -5147,15 +5141,17 @@ static void pti_collapse(const pti_wide_builder *b, pti_binary *n)
     for (k = 2; k <= 7; k++) n->cost[k - 1] = best[k] < n->cost[k - 2] ? best[k] : n->cost[k - 2];
 }
 
-/* Node n, whose range is known, and all below it. pieces: what is small is left for later. The root parts flat primitives
-   from spheres. No n boxes make more than 5 n / 18 leaves: four and more do on each side of a plane, and where none is found,
-   18 are 16, of four leaves, and 2. */
+/* Node n, whose range is known, and all below it. pieces: what is small is left for later. First walls
+   are parted from the rest, and then flat primitives from spheres. Below the top no n boxes make
+   more than 5 n / 18 leaves: four and more are on each side of a plane, and where none is found, 18 are 16, of four leaves,
+   and 2. */
 static void pti_build_binary(pti_wide_builder *b, uint32_t n, const pti_joined *all, int depth, int pieces)
 {
     pti_binary *node = &b->nodes[n];
     const uint32_t begin = node->first, end = begin + node->count;
     const float area = pti_box_area(all->box.v);
-    const int mixed = n == 0 && b->flat_lanes > 0 && b->flat_lanes < end, leaf = node->count <= 8 && !mixed;
+    const uint32_t kinds = begin < b->walls ? b->walls : b->flats;
+    const int mixed = depth < 2 && begin < kinds && kinds < end, leaf = node->count <= 8 && !mixed;
     pti_parting p = {-1, 0, 0, 0, HUGE_VALF, (node->count / 2 + 7) / 8 * 8};
     pti_joined side[2];
     uint32_t middle, k;
@@ -5165,14 +5161,15 @@ static void pti_build_binary(pti_wide_builder *b, uint32_t n, const pti_joined *
     }
     node->child = 0;
     for (k = 0; k < 7; k++) node->cost[k] = area;
-    if (leaf) return;
-    if (pieces && n > 0 && node->count <= b->piece_size && b->piece_count < PTI_PIECES) {
+    if (leaf && (depth >= PTI_TOP || area < b->cut)) return;
+    if (pieces && n > 0 && !leaf && node->count <= b->piece_size && b->piece_count < PTI_PIECES) {
         const pti_piece piece = {n, depth, *all};
         b->pieces[b->piece_count++] = piece;
         return;
     }
-    if (mixed) p.middle = b->flat_lanes;
-    else if (depth < PTI_WIDE_DEPTH) pti_find_parting(b, begin, end, all->centres.v, &p);
+    if (mixed) p.middle = kinds - begin;
+    else if (depth < PTI_WIDE_DEPTH) pti_find_parting(b, begin, end, all->centres.v, depth < PTI_TOP ? 1 : 4, &p);
+    if (leaf && !(p.cost < area)) return;
     middle = pti_part(b, begin, end, &p, side);
     node->child = (uint32_t)PTI_ADD(&b->next, 2);
     for (k = 0; k < 2; k++) {
@@ -5280,50 +5277,51 @@ static uint32_t pti_write_tree(pti_wide_builder *b, uint32_t n)
     return reference;
 }
 
-/* The boxes of `lanes` lanes, but for walls that stand apart, and all of them joined. */
-static pti_joined pti_fill_boxes(pti_wide_builder *b, uint32_t lanes)
+/* All boxes, those of walls first, and all of them joined. */
+static pti_joined pti_fill_boxes(pti_wide_builder *b, pt_wide *wide, uint32_t lanes)
 {
     pti_joined all;
     uint32_t i;
     all.box.f = all.centres.f = pti_f8_set(-HUGE_VALF);
-    b->lanes = b->flat_lanes = b->walls = 0;
+    b->walls = wide->wall_count = 0;
     for (i = 0; i < lanes; i++) {
         const uint32_t id = pti_lane_primitive(b, i);
-        pti_lanes *box = &b->boxes[b->lanes];
+        pti_lanes box;
         pt_vec3 lo, hi;
         pti_primitive_box(b->scene, &b->scene->primitives[id], &lo, &hi);
-        box->v[0] = -lo.x; box->v[1] = -lo.y; box->v[2] = -lo.z; box->bits[3] = i;
-        box->v[4] = hi.x; box->v[5] = hi.y; box->v[6] = hi.z; box->v[7] = 0;
-        if (i < b->flats && pti_box_area(box->v) > b->apart) {
-            if (b->walls == PTI_WALLS) { /* these are too many to be asked by every ray */
-                b->apart = HUGE_VALF;
-                return pti_fill_boxes(b, lanes);
-            }
-            if (b->walls == 0 || b->list[b->walls - 1] != id) b->list[b->walls++] = id; /* else its second half */
-            continue;
+        box.v[0] = -lo.x; box.v[1] = -lo.y; box.v[2] = -lo.z; box.bits[3] = i;
+        box.v[4] = hi.x; box.v[5] = hi.y; box.v[6] = hi.z; box.v[7] = 0;
+        all.box.f = pti_f8_max(box.f, all.box.f);
+        all.centres.f = pti_f8_max(pti_f8_sub(box.f, pti_f8_swap(box.f)), all.centres.f);
+        b->boxes[i] = box;
+        if (i >= b->flats || !(pti_box_area(box.v) > b->wall)) continue;
+        b->boxes[i] = b->boxes[b->walls];
+        b->boxes[b->walls++] = box;
+        if (wide->wall_count > 0 && wide->walls[wide->wall_count - 1] == id) continue; /* its second half */
+        if (wide->wall_count == PTI_WALLS) {
+            b->wall = HUGE_VALF;
+            return pti_fill_boxes(b, wide, lanes);
         }
-        b->lanes++;
-        b->flat_lanes += i < b->flats;
-        all.box.f = pti_f8_max(box->f, all.box.f);
-        all.centres.f = pti_f8_max(pti_f8_sub(box->f, pti_f8_swap(box->f)), all.centres.f);
+        wide->walls[wide->wall_count++] = id;
     }
     return all;
 }
 
 /* The binary tree. The costs of the nodes above the pieces come last, upwards. */
-static void pti_build_nodes_of(pti_wide_builder *b, uint32_t lanes)
+static void pti_build_nodes_of(pti_wide_builder *b, pt_wide *wide, uint32_t lanes)
 {
     const pt_scene *scene = b->scene;
     const pt_vec3 size = pt_v3_sub(scene->hi, scene->lo);
     const float widest = (float)fmax(pti_max3((double)size.x, (double)size.y, (double)size.z), 1e-30);
     pti_joined all;
     pti_counter n;
-    b->apart = PTI_APART * widest * widest;
-    all = pti_fill_boxes(b, lanes);
+    b->wall = PTI_WALL * widest * widest;
+    b->cut = PTI_CUT * widest * widest;
+    all = pti_fill_boxes(b, wide, lanes);
     b->piece_size = lanes / 64 > 4096 ? lanes / 64 : 4096;
     b->next = 1;
     b->nodes[0].first = 0;
-    b->nodes[0].count = b->lanes;
+    b->nodes[0].count = lanes;
     pti_build_binary(b, 0, &all, 0, 1);
     n = b->next;
     if (scene->parallel) scene->parallel(scene->parallel_user, b->piece_count, pti_build_piece, b);
@@ -5332,13 +5330,40 @@ static void pti_build_nodes_of(pti_wide_builder *b, uint32_t lanes)
         if (b->nodes[n].child) pti_collapse(b, &b->nodes[n]);
 }
 
+/* Writes, or counts, a second root without the children that hold walls; the first parting put nothing else there. If all are walls,
+   or none, there is no need of it. */
+static void pti_write_things(pti_wide_builder *b, pt_wide *wide)
+{
+    const pti_node8 *root = (const pti_node8 *)(const void *)b->arena; /* the first of the arena */
+    pti_node8 *out = b->arena ? (pti_node8 *)(void *)(b->arena + b->used) : NULL;
+    uint32_t children[8];
+    int count, i, k;
+    wide->things = wide->root;
+    if (b->walls == 0 || b->walls == b->nodes[0].count) {
+        wide->wall_count = 0;
+        return;
+    }
+    wide->things = (uint32_t)(b->used / 64) << 3;
+    b->used += sizeof *out;
+    if (!out) return;
+    *out = *root;
+    count = pti_gather(b->nodes, 0, 8, children, 0);
+    for (i = 0; i < count; i++) {
+        if (b->nodes[children[i]].first >= b->walls) continue;
+        out->child[i] = 0;
+        for (k = 0; k < 3; k++) {
+            out->box[k][i] = HUGE_VALF;
+            out->box[3 + k][i] = -HUGE_VALF;
+        }
+    }
+}
+
 /* Over primitives of which `triangles` are triangles, then halves / 2 parallelograms, the rest spheres. 0 = no memory. */
 static int pti_build_wide_tree(const pt_scene *scene, pt_wide *wide, uint32_t triangles, uint32_t halves)
 {
-    const uint32_t lanes = scene->primitive_count + halves / 2, nodes = lanes / 9 * 5 + 16;
+    const uint32_t lanes = scene->primitive_count + halves / 2, nodes = lanes / 9 * 5 + 600;
     void *user = scene->alloc_user, *memory;
     pti_wide_builder b;
-    size_t apart = 0;
     int ok;
     memset(&b, 0, sizeof b);
     b.nodes = (pti_binary *)pti_alloc_lines(((size_t)lanes + 2 * (size_t)nodes) * sizeof(pti_lanes), &memory, user);
@@ -5348,18 +5373,17 @@ static int pti_build_wide_tree(const pt_scene *scene, pt_wide *wide, uint32_t tr
         b.triangles = wide->triangles = triangles;
         b.flats = triangles + halves;
         b.boxes = (pti_lanes *)(void *)(b.nodes + nodes);
-        pti_build_nodes_of(&b, lanes);
-        b.used = apart = b.walls > 0 ? sizeof(pti_small) : 0;
+        pti_build_nodes_of(&b, wide, lanes);
         pti_write_tree(&b, 0);
+        pti_write_things(&b, wide);
         if (b.used / 64 < (size_t)1 << 29) b.arena = wide->arena = (unsigned char *)pti_alloc_lines(b.used, &wide->memory, user);
         ok = b.arena != NULL;
     }
     if (ok) {
         wide->bytes = b.used;
-        wide->tree = 1;
-        if (b.walls > 0) pti_write_apart(scene, wide, (pti_small *)(void *)b.arena, b.list, b.walls, 0, 0);
-        b.used = apart;
+        b.used = 0;
         wide->root = pti_write_tree(&b, 0);
+        pti_write_things(&b, wide);
     }
     pti_free(memory, user);
     return ok;
@@ -5697,14 +5721,14 @@ PTI_INLINE int pti_test_leaf(const pt_scene *scene, uint32_t leaf, const pti_ray
     return found;
 }
 
-/* Walks the tree, near children first; any = 1 stops at the first hit. */
-PTI_INLINE int pti_traverse_wide(const pt_scene *scene, const pti_ray *r, pti_ray8 *w, float limit, pti_best *best, int any)
+/* Walks the tree from a reference on, near children first; any = 1 stops at the first hit. */
+PTI_INLINE int pti_traverse_wide(const pt_scene *scene, const pti_ray *r, const pti_ray8 *w, uint32_t at, pti_best *best, int any)
 {
     const pt_wide *tree = &scene->wide;
     pti_waiting stack[PTI_WAITING];
-    uint32_t at = tree->root, limit_bits;
+    uint32_t limit_bits;
+    float limit = pti_ray8_limit(w, best->t);
     int top = 0, found = 0;
-    pti_ray8_for_tree(w, r);
     memcpy(&limit_bits, &limit, sizeof limit_bits);
     for (;;) {
         if ((at & 7) == PTI_NODE) {
@@ -5860,18 +5884,19 @@ PTI_INLINE int pti_test_start(const pt_scene *scene, const pti_ray *r, const pti
     return 1;
 }
 
-/* The nearest: first by the tree, if there is one, up to a wall that is hit for certain; then in the order of starts. */
-PTI_INLINE int pti_nearest_apart(const pt_scene *scene, const pti_ray *r, pti_ray8 *w, pti_best *best)
+/* The nearest, in the order of starts. */
+PTI_INLINE int pti_nearest_small(const pt_scene *scene, const pti_ray *r, const pti_ray8 *w, pti_best *best)
 {
     const pti_small *small = (const pti_small *)(const void *)scene->wide.arena;
-    const pti_f8 zero = pti_f8_set(0), none = pti_f8_set(HUGE_VALF);
-    pti_f8 least = none, wall = none, margin;
+    const pti_f8 zero = pti_f8_set(0);
+    pti_f8 least = pti_f8_set(HUGE_VALF);
     pti_planes8 h;
     pti_starts s;
     float start, limit;
     int found = 0, i;
     s.clear = w->span / w->reach;
     s.end = pti_ray8_limit(w, best->t);
+    limit = pti_last_start(s.end);
     s.planes = scene->wide.plane_blocks;
     s.count = s.planes + scene->wide.sphere_blocks;
     for (i = 0; i < s.planes; i++) {
@@ -5881,27 +5906,18 @@ PTI_INLINE int pti_nearest_apart(const pt_scene *scene, const pti_ray *r, pti_ra
         s.more[i].f = h.more;
         s.error[i].f = h.error;
         least = pti_f8_min(least, s.t[i].f);
-        if (scene->wide.tree) {
-            pti_planes_within(&h, s.end, 2 * s.clear, &margin);
-            wall = pti_f8_min(wall, pti_f8_select(pti_f8_lt(zero, margin), pti_f8_add(h.t, h.off), none));
-        }
     }
     for (; i < s.count; i++) {
         s.t[i].f = pti_f8_tag(pti_sphere_lanes(&small->spheres[i - s.planes], w), small->tag[i].f);
         least = pti_f8_min(least, s.t[i].f);
     }
-    if (scene->wide.tree) {
-        limit = pti_last_start(pti_f8_least(wall));
-        found = pti_traverse_wide(scene, r, w, limit < s.end ? limit : s.end, best, 0);
-    }
-    limit = pti_last_start(found ? pti_ray8_limit(w, best->t) : s.end);
     for (start = pti_f8_least(least); start <= limit; start = pti_next_start(&s, start, limit))
         found |= pti_test_start(scene, r, w, &s, start, &limit, best);
     return found;
 }
 
 /* Any, in no order. */
-PTI_INLINE int pti_any_apart(const pt_scene *scene, const pti_ray *r, pti_ray8 *w, pti_best *best)
+PTI_INLINE int pti_any_small(const pt_scene *scene, const pti_ray *r, const pti_ray8 *w, pti_best *best)
 {
     const pti_small *small = (const pti_small *)(const void *)scene->wide.arena;
     const int planes = scene->wide.plane_blocks, count = planes + scene->wide.sphere_blocks;
@@ -5919,19 +5935,23 @@ PTI_INLINE int pti_any_apart(const pt_scene *scene, const pti_ray *r, pti_ray8 *
     for (; i < count; i++) may |= (uint64_t)pti_m8_bits(pti_f8_le(pti_sphere_lanes(&small->spheres[i - planes], w), pti_f8_set(end))) << 8 * i;
     for (i = 0; i < PTI_SMALL && may >> i; i++)
         if ((may >> i & 1) && pti_test_both(scene, r, &small->tested[i], best)) return 1;
-    return scene->wide.tree && pti_traverse_wide(scene, r, w, end, best, 1);
+    return 0;
 }
 
-/* Only what is in the tree, up to best->t: the nearest or any; -1: not a ray for lanes. */
-static int pti_nearest_in_tree(const pt_scene *scene, const pti_ray *r, pti_best *best)
+/* What is not a wall, up to best->t: the nearest or any; -1: not a ray for lanes. */
+static int pti_nearest_thing(const pt_scene *scene, const pti_ray *r, pti_best *best)
 {
     pti_ray8 w;
-    return pti_ray8_make(&w, r, scene->wide.extent) ? pti_traverse_wide(scene, r, &w, pti_ray8_limit(&w, best->t), best, 0) : -1;
+    if (!pti_ray8_make(&w, r, scene->wide.extent)) return -1;
+    pti_ray8_for_tree(&w, r);
+    return pti_traverse_wide(scene, r, &w, scene->wide.things, best, 0);
 }
-static int pti_any_in_tree(const pt_scene *scene, const pti_ray *r, pti_best *best)
+static int pti_any_thing(const pt_scene *scene, const pti_ray *r, pti_best *best)
 {
     pti_ray8 w;
-    return pti_ray8_make(&w, r, scene->wide.extent) ? pti_traverse_wide(scene, r, &w, pti_ray8_limit(&w, best->t), best, 1) : -1;
+    if (!pti_ray8_make(&w, r, scene->wide.extent)) return -1;
+    pti_ray8_for_tree(&w, r);
+    return pti_traverse_wide(scene, r, &w, scene->wide.things, best, 1);
 }
 
 /* What pti_search calls: the nearest hit or any; -1: not a ray for lanes. */
@@ -5939,9 +5959,9 @@ PTI_INLINE int pti_search_wide(const pt_scene *scene, const pti_ray *r, pti_best
 {
     pti_ray8 w;
     if (!pti_ray8_make(&w, r, scene->wide.extent)) return -1;
-    if (scene->wide.plane_blocks + scene->wide.sphere_blocks == 0)
-        return pti_traverse_wide(scene, r, &w, pti_ray8_limit(&w, best->t), best, any);
-    return any ? pti_any_apart(scene, r, &w, best) : pti_nearest_apart(scene, r, &w, best);
+    if (scene->wide.plane_blocks + scene->wide.sphere_blocks > 0) return any ? pti_any_small(scene, r, &w, best) : pti_nearest_small(scene, r, &w, best);
+    pti_ray8_for_tree(&w, r);
+    return pti_traverse_wide(scene, r, &w, scene->wide.root, best, any);
 }
 
 #endif /* PTI_HAS_WIDE */
@@ -8043,7 +8063,7 @@ static unsigned pti_find_needs(const pt_scene *scene)
     if (scene->bvh.node_count > 0) needs |= PT_NEEDS_BVH;
 #endif
 #if PTI_HAS_WIDE
-    if (scene->wide.tree) needs |= PT_NEEDS_BVH;
+    if (scene->wide.bytes > 0 && scene->wide.plane_blocks + scene->wide.sphere_blocks == 0) needs |= PT_NEEDS_BVH;
 #endif
     return needs;
 }
@@ -9442,7 +9462,7 @@ PTDEF pt_rgbd pt_li_branching(const pt_scene *scene, const pt_ray *ray, pt_sampl
    A path of a small scene spends its time on a few dozen multiplications at a time, one path after the other. Here as
    many paths as the machine has lanes walk together: each instruction takes one step of all of them, and a lane whose
    path has ended takes the next path from a queue ([Lai13] for GPUs; here it is the lanes of one core). In scenes of more
-   than 64 primitives lanes ask for the walls that stand apart from the tree [PT-07b], and the tree for one ray after the other,
+   than 64 primitives lanes ask for the walls ([PT-07b]) and the tree for one ray after the other,
    if it may come near what is in it before it meets a wall. The estimator is that of pti_path, with three differences that
    change no expectation:
 
@@ -10068,18 +10088,19 @@ static int pti_lock_smooth(const pt_scene *scene, uint32_t i)
     return p->shape == PT_SHAPE_TRIANGLE && scene->meshes[scene->triangles[p->index].mesh].has_normals;
 }
 
-/* The walls that stand apart from the scene's tree, and the corners of its box in two items more; 0: not all are items, or some have
+/* The walls of the scene's tree, and the corners of its box in two items more; 0: not all are items, or some have
    shading normals. */
 static int pti_lock_collect_walls(const pt_scene *scene, pti_lock_item *items)
 {
-    const pti_small *small = (const pti_small *)(const void *)scene->wide.arena;
+    const pt_wide *tree = &scene->wide;
     const pt_vec3 a = scene->lo, b = scene->hi;
-    int lane, count = 0, k;
-    for (lane = 0; lane < 8 * scene->wide.plane_blocks; lane++) {
-        const uint32_t id = (uint32_t)small->tested[lane].id, other = (uint32_t)small->tested[PTI_SMALL + lane].id;
-        if (small->planes[lane / 8].steep[lane % 8] == 0) continue; /* no one's */
-        if (pti_lock_collect(scene, id, (double)scene->wide.extent, &items[count++]) != 1 + (id != other)) return 0;
-        if (pti_lock_smooth(scene, id) || pti_lock_smooth(scene, other)) return 0;
+    uint32_t i = 0;
+    int count = 0, k;
+    while (i < tree->wall_count) {
+        const uint32_t id = tree->walls[i], taken = pti_lock_collect(scene, id, (double)tree->extent, &items[count++]);
+        if (taken == 2 && (i + 1 == tree->wall_count || tree->walls[i + 1] != id + 1)) return 0;
+        if (pti_lock_smooth(scene, id) || pti_lock_smooth(scene, id + taken - 1)) return 0;
+        i += taken;
     }
     for (k = 0; k < 2; k++) {
         const pt_real z = k ? b.z : a.z;
@@ -10094,10 +10115,10 @@ static int pti_lock_collect_walls(const pt_scene *scene, pti_lock_item *items)
     return count;
 }
 
-/* The box of the children of the root. */
+/* The box around all but walls. */
 static void pti_lock_write_box(pti_lockstep *k, const pt_wide *tree)
 {
-    const pti_node8 *root = (const pti_node8 *)(const void *)pti_place(tree, tree->root);
+    const pti_node8 *root = (const pti_node8 *)(const void *)pti_place(tree, tree->things);
     int i, j;
     for (i = 0; i < 3; i++) {
         k->box[i] = root->box[i][0];
@@ -10117,7 +10138,7 @@ static void pti_lockstep_make_walls(pti_lockstep *k, const pt_scene *scene, pt_v
     pti_lock_item items[PTI_WALLS + 2];
     pti_lockstep all = *k;
     int count, i;
-    if (!scene->wide.tree || scene->wide.plane_blocks == 0 || (scene->wide.root & 7) != PTI_NODE) return;
+    if (scene->wide.wall_count == 0) return;
     count = pti_lock_collect_walls(scene, items);
     if (count == 0 || count + (int)scene->material_count > PTI_LOCK_MAX) return;
     all.e = pti_lock_error(x);
@@ -10485,7 +10506,7 @@ static int pti_lock_meet_tree(const pti_lockstep *k, const pti_ray *r, int wall,
         const double *plane = k->plane[wall], t = -(pti_lock_along(plane, r->o) + plane[3]) / pti_lock_along(plane, r->d);
         if (t > 0 && t < best.t) best.t = t;
     }
-    found = pti_nearest_in_tree(k->tree, r, &best);
+    found = pti_nearest_thing(k->tree, r, &best);
     if (found < 0) return pti_intersect(k->tree, r, hit);
     if (found) pti_fill(k->tree, r, &best, hit);
     return found;
@@ -10607,7 +10628,7 @@ static pti_mw pti_lock_blocked(const pti_lockstep *k, const pti_lock_met *met, u
         const pti_d3 end = pti_d((double)to[0].v[lane], (double)to[1].v[lane], (double)to[2].v[lane]);
         const pti_ray r = pti_ray_from(start, pti_d_sub(end, start), 1);
         pti_best best = {1, 0, 0, -1};
-        int found = k->walls > 0 ? pti_any_in_tree(k->tree, &r, &best) : -1;
+        int found = k->walls > 0 ? pti_any_thing(k->tree, &r, &best) : -1;
         if (found < 0) found = pti_occluded(k->tree, &r);
         blocked |= (unsigned)found << lane;
     }
@@ -15150,8 +15171,8 @@ PTDEF const pt_scene_entry *pt_scene_find(const char *name)
 /*
    VERSION HISTORY
 
-   0.6.0 (2026-11-23)  the walls of a room stand apart from the wide tree: every ray asks them first, and lockstep asks for
-                       them in lanes, so that meshes in rooms take about 0.6 of the time
+   0.6.0 (2026-11-23)  lockstep asks for the walls of a room in lanes, and the tree only for what is not a wall: meshes in
+                       rooms take about 0.6 of the time
    0.5.1 (2026-11-22)  lockstep mended: mirrors and glass seen from behind their shading normals, pictures that hung on
                        the size of tiles by a bit, rooms below 1e-15, small lamps far off.
    0.5.0 (2026-11-22)  paths walk in lockstep in scenes of any size, with metal, rough and smooth, and shading normals.

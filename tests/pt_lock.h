@@ -230,10 +230,10 @@ static inline void add_smooth_ball(pt_scene *s, double x, double y, double z, do
 /* What small scenes cannot have, where nobody sees it: then the scene's tree is asked. */
 static inline void add_speck(pt_scene *s, const place *at) { add_ball(s, at, 1.2, 0, 0, 0.0002, diffuse(s, 0.5, 0.5, 0.5)); }
 
-/* So many triangles, where nobody sees them, that walls stand apart from a tree. */
+/* So many triangles, where nobody sees them, that it has a tree, and walls in it. */
 static inline void add_crowd(pt_scene *s, const place *at)
 {
-    const place far = {at->turn, 0.02 * at->scale, at->x + (at->turn > 0 ? 1.9 : 1.2) * at->scale, at->y, at->z};
+    const place far = {at->turn, 0.02 * at->scale, at->x + 1.9 * at->scale, at->y, at->z};
     int k, m = diffuse(s, 0.5, 0.5, 0.5);
     for (k = 0; k < 6; k++) add_cube(s, QUAD, &far, -1, 1 + k, 1, m);
 }

@@ -356,7 +356,7 @@ static const constant CONSTANTS[] = {
      "p + p_low: rounding the rest once more leaves u^2 |p|"},
     {"pti_d_scale(pti_d(fabs(p.x), fabs(p.y), fabs(p.z)), 4 * PTI_2_M53)",
      "start of the next ray: the sums p + p_low and p + offset"},
-    {"3 * PTI_UNIT_ROUNDOFF * fmax(fabs(all->lo[k]), fabs(all->hi[k]))",
+    {"3 * PTI_UNIT_ROUNDOFF * fmax(fabs((double)a.x), fabs((double)b.x))",
      "boxes of the tree: a ray's origin rounded to pt_real, and two roundings there"},
     {"q = fmin(q, 1 - PTI_2_M24);",
      "roulette ends every path at last: option PT_ROULETTE_THROUGHPUT, unbiased"},

@@ -98,7 +98,7 @@ static double walk_to_the_end(int kind, double rho, int k, uint32_t spp, int by_
         for (i = 0; i < width * height; i++) wrong += memcmp(film.half[h] + 3 * i, film.half[0], 3 * sizeof film.half[0][0]) != 0;
     pt_check((double)rays == paths * k || (touching && (double)rays >= (1 - 1e-6 * k) * paths * k), name, "%.0f of %.0f edges are missing", paths * k - (double)rays,
              paths * k);
-    pt_check(wrong <= (touching ? 4 + 0.6e-6 * paths * k : 0), name, "%d of %d sums of pixels differ from the first, after %.0f edges", wrong, 2 * width * height,
+    pt_check(wrong <= (touching ? 4 + (by_tree == 2 ? 0 : 0.6e-6) * paths * k : 0), name, "%d of %d sums of pixels differ from the first, after %.0f edges", wrong, 2 * width * height,
              paths * k);
     /* k products and k sums in float */
     pt_check(fabs(film.half[0][0] / (0.5 * spp) - exact) <= 2 * k * PTI_2_M24 * exact, name, "%.9g, exactly %.9g", film.half[0][0] / (0.5 * spp), exact);
@@ -108,7 +108,7 @@ static double walk_to_the_end(int kind, double rho, int k, uint32_t spp, int by_
     return (double)rays;
 }
 
-/* Do walls of it stand apart if it is crowded? */
+/* Has its tree walls if it is crowded? */
 static int has_walls(int kind) { return kind != BALL && kind != SHELLS && kind != THIN_WEDGE; }
 
 static void no_way_out(void)
@@ -120,14 +120,15 @@ static void no_way_out(void)
         if (kind != THIN_WEDGE) edges += walk_to_the_end(kind, 0.999, 500, 2 * more, 0);
         if (WHOLE || kind == WEDGE) edges += walk_to_the_end(kind, 0.9, 10, kind == THIN_WEDGE ? 2 : 8 * few, kind == THIN_WEDGE);
         if (WHOLE || kind == FANS) edges += walk_to_the_end(kind, 0.999, 200, 2, 1);
-        if (WHOLE ? has_walls(kind) : kind == FANS) edges += walk_to_the_end(kind, 0.999, 200, 2 * more, 2);
+        if (WHOLE ? has_walls(kind) : kind == FANS) edges += walk_to_the_end(kind, 0.999, kind == THINGS ? 500 : 200, 2 * more, 2);
     }
     printf("edges walked in closed scenes: %.4g\n", edges);
 }
 
 /* Rooms whose walls emit 1, reflect 0.9, and are asked in lanes; meshes in them, of albedo 1, are for the tree. No path leaves the
    room, so that every one walks to the end; and none gets into a thing, where it would see no wall again: the first 40 walls
-   give 98 % of all light. But from less than e above a wall that a thing stands on, one path in a million edges may miss it. */
+   give 98 % of all light. But from less than e above a wall that a thing stands on, and along edges, a path in a million
+   edges may be lost: turned, they are far off, and e is 1e-4. */
 enum { IN_THE_AIR, ON_THE_FLOOR, THROUGH_THE_FLOOR, BLOCK_ON_THE_FLOOR, FROM_WALL_TO_WALL, SHEET_ON_THE_FLOOR, HALF_OF_WALLS, FURNISHED };
 static const char *const furnished_names[FURNISHED] = {"a ball in the air", "a ball that touches the floor", "a ball through the floor", "a block on the floor",
                                                        "a block from wall to wall", "a sheet 1e-5 above the floor", "a block, half of walls"};
@@ -230,7 +231,7 @@ static void furnished_rooms(void)
             stage s = furnished(kind, 0.7 * turned, 0.9, NOTHING);
             pt_render_desc d = desc_of(&s, width, height, spp);
             const double r = (double)(pt_real)0.9, most = spp / 2 / (1 - r), all = (double)spp * width * height * k;
-            const double loss = kind == IN_THE_AIR ? 0 : 1e-6;
+            const double lost = kind == IN_THE_AIR ? 0 : 4 + 2e-6 * all; /* paths: so many, and 4 more by chance */
             pti_lockstep ready;
             pt_film film;
             uint64_t rays;
@@ -241,9 +242,9 @@ static void furnished_rooms(void)
             d.li.max_edges = k;
             d.li.roulette = PT_ROULETTE_NONE;
             film = render(&s, &d, 2, &rays);
-            pt_check((double)rays <= all && (double)rays >= (1 - loss * k) * all, name, "%.0f of %.0f edges are missing", all - (double)rays, all);
+            pt_check((double)rays <= all && (double)rays >= all - lost * k, name, "%.0f of %.0f edges are missing", all - (double)rays, all);
             for (i = 0; i < 3 * width * height; i++) wrong += !(fmin(film.half[0][i], film.half[1][i]) > 0.98 * most && fmax(film.half[0][i], film.half[1][i]) < 1.00001 * most);
-            pt_check(wrong <= 3 * loss * all, name, "%d pixels have less or more than all light", wrong);
+            pt_check(wrong <= 3 * lost, name, "%d pixels have less or more than all light", wrong);
             edges += (double)rays;
             pt_film_free(&film);
             pt_scene_free(&s.scene);

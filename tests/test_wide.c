@@ -207,8 +207,7 @@ static void add_room(pt_scene *s, int count, pt_vec3 at, double scale, int m)
     if (count % 2) pt_add_sphere(s, at, (pt_real)(0.3 * scale), m);
 }
 
-/* Walls that stand apart from a tree, of all kinds: pairs of triangles, parallelograms, and a triangle across; in it things for
-   the tree. */
+/* Walls of all kinds: pairs of triangles, parallelograms, and a triangle across; in it other things. */
 static void add_furnished(pt_scene *s, int count, pt_vec3 at, double scale, int m)
 {
     const pt_vec3 x = v3(scale, 0, 0.2 * scale), y = v3(0, scale, 0), z = v3(-0.2 * scale, 0, scale);
@@ -651,19 +650,23 @@ static void count_below(const pt_scene *s, uint32_t at, const pti_node8 *n, int 
     }
 }
 
-/* The same for what stands apart. */
-static void count_apart(const pt_scene *s, census *c)
+/* From its second root, a tree has all but walls once. */
+static void things(const pt_scene *s)
 {
-    const pti_small *small = (const pti_small *)(const void *)s->wide.arena;
-    int i, k;
-    for (i = 0; i < 8 * (s->wide.plane_blocks + s->wide.sphere_blocks); i++) {
-        const int sphere = i >= 8 * s->wide.plane_blocks, at = i - 8 * s->wide.plane_blocks;
-        if (sphere ? small->spheres[at / 8].centre[0][at % 8] > 1e29f : small->planes[i / 8].steep[i % 8] <= 0) continue; /* empty */
-        for (k = 0; k < (sphere ? 1 : 2); k++) {
-            const int id = small->tested[i + k * PTI_SMALL].id;
-            if (k == 0 || small->tested[i].half || id != small->tested[i].id) c->seen[id] = (unsigned char)(c->seen[id] + 1);
-        }
+    census c = {NULL, 0, 0, 0, 0};
+    uint32_t i, k;
+    int missing = 0;
+    c.seen = (unsigned char *)calloc(s->primitive_count + 1, 1);
+    if (!c.seen) return;
+    count_below(s, s->wide.things, NULL, 0, 0, &c);
+    for (i = 0; i < s->primitive_count; i++) {
+        int wall = 0;
+        for (k = 0; k < s->wide.wall_count; k++) wall |= s->wide.walls[k] == i;
+        missing += c.seen[i] != (wall ? 0 : s->primitives[i].shape == PT_SHAPE_PARALLELOGRAM ? 2 : 1);
     }
+    pt_check(s->wide.wall_count == 10, "a room with a ball", "%d walls", (int)s->wide.wall_count);
+    pt_check(c.wrong == 0 && missing == 0, "a room with a ball", "%d boxes or references are wrong, %d things are not in it once, or walls are", c.wrong, missing);
+    free(c.seen);
 }
 
 static void structure(void)
@@ -677,12 +680,11 @@ static void structure(void)
             int missing = 0;
             if (!make(&s, kind, n, v3(0, 0, 0), 1, PT_TREE_DEFAULT)) return;
             c.seen = (unsigned char *)calloc(s.primitive_count + 1, 1);
-            if (c.seen) count_apart(&s, &c);
-            if (c.seen && s.wide.tree) count_below(&s, s.wide.root, NULL, 0, 0, &c);
+            if (c.seen) count_below(&s, s.wide.root, NULL, 0, 0, &c);
             for (i = 0; c.seen && i < s.primitive_count; i++) missing += c.seen[i] != (s.primitives[i].shape == PT_SHAPE_PARALLELOGRAM ? 2 : 1);
             pt_check(c.wrong == 0 && missing == 0, label("the wide tree of %s, %d", NAMES[kind], n),
                      "%d boxes or references are wrong, %d primitives are not in it once", c.wrong, missing);
-            pt_check(kind != FURNISHED || s.wide.plane_blocks == 1, "a room with a ball", "walls stand in %d blocks of eight lanes", s.wide.plane_blocks);
+            if (kind == FURNISHED) things(&s);
             if (kind == BALL && n > 20000) {
                 const double bytes = (double)s.wide.bytes / s.primitive_count;
                 printf("the wide tree: %.1f bytes a triangle, %.2f of 8 lanes used, depth %d\n", bytes, (double)c.lanes / c.leaves, c.depth);
