@@ -1,4 +1,4 @@
-/* pathtracer.h - v0.6.0 - a path tracer in one C99 header: render by the rendering equation,
+/* pathtracer.h - v0.6.1 - a path tracer in one C99 header: render by the rendering equation,
    know how wrong the picture still is, and how long that took.      MIT-0 or public domain, see the end.
 
    Do this in exactly ONE C or C++ file, and include the header plainly everywhere else:
@@ -200,8 +200,8 @@
 
 #define PT_VERSION_MAJOR 0
 #define PT_VERSION_MINOR 6
-#define PT_VERSION_PATCH 0
-#define PT_VERSION_STRING "0.6.0"
+#define PT_VERSION_PATCH 1
+#define PT_VERSION_STRING "0.6.1"
 
 #if (defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ > 0) || \
      defined(__ASSOCIATIVE_MATH__) || defined(__RECIPROCAL_MATH__) || defined(_M_FP_FAST)) && \
@@ -4771,8 +4771,8 @@ static int pti_traverse(const pt_scene *scene, const pti_ray *r, pti_best *best,
    Lanes are float, and float cannot decide: [PT-06] decides in double, exactly. So a lane only asks whether a primitive
    MAY be hit. It computes in float what [PT-06] computes in double, and a bound of the difference, and says no, or yes, where
    the bound allows no other answer. What it does not deny, little more than one primitive for each hit, goes to [PT-06], or,
-   where it is certain, only through its arithmetic. So rounding costs time, never a hit: the wide tree, the binary tree and
-   the linear search agree, and a lane may use fused multiply-adds where there are some.
+   where it is certain, only through its arithmetic, once no nearer one is found. So rounding costs time, never a hit: the
+   wide tree, the binary tree and the linear search agree, and a lane may use fused multiply-adds where there are some.
 
    Below, u = 2^-24 is the roundoff of float: each operation is off by u of its result. S is a length that no coordinate of
    a ray's origin and of the scene exceeds, and no way between them along an axis. It is kept between 2^-16 and 2^40: then no
@@ -4782,8 +4782,9 @@ static int pti_traverse(const pt_scene *scene, const pti_ray *r, pti_best *best,
 
    What makes it fast [Wal08], [Yli17], in the order of what each gave: nodes of eight children, so that a ray visits a
    third of the nodes and tests their boxes at the price of one; leaves of eight triangles, stored as rows of lanes; nodes and
-   leaves in one piece of memory, in the order of a walk, and fetched as soon as a ray is known to meet them; and no branches on
-   what cannot be foretold. Cost for n primitives: about 50 n bytes, O(n log n) to build. */
+   leaves in one piece of memory, in the order of a walk, and fetched as soon as a ray is known to meet them; no branches on
+   what cannot be foretold; and a walk that does not wait for numbers in double. Cost for n primitives: about 50 n bytes,
+   O(n log n) to build. */
 
 #if PTI_HAS_WIDE
 
@@ -5125,11 +5126,16 @@ static uint32_t pti_part(pti_wide_builder *b, uint32_t begin, uint32_t end, cons
     return left;
 }
 
+static float pti_node_area(const pti_binary *n)
+{
+    const float box[8] = {-n->lo[0], -n->lo[1], -n->lo[2], 0, n->hi[0], n->hi[1], n->hi[2], 0};
+    return pti_box_area(box);
+}
+
 /* c(n, k) of a node whose children have theirs. */
 static void pti_collapse(const pti_wide_builder *b, pti_binary *n)
 {
     const float *l = b->nodes[n->child].cost, *r = b->nodes[n->child + 1].cost;
-    const float box[8] = {-n->lo[0], -n->lo[1], -n->lo[2], 0, n->hi[0], n->hi[1], n->hi[2], 0};
     float best[9];
     int k, j;
     for (k = 2; k <= 8; k++) {
@@ -5137,7 +5143,7 @@ static void pti_collapse(const pti_wide_builder *b, pti_binary *n)
         for (j = 1; j < k; j++)
             if (l[j - 1] + r[k - j - 1] < best[k]) best[k] = l[j - 1] + r[k - j - 1];
     }
-    n->cost[0] = pti_box_area(box) + best[8];
+    n->cost[0] = pti_node_area(n) + best[8];
     for (k = 2; k <= 7; k++) n->cost[k - 1] = best[k] < n->cost[k - 2] ? best[k] : n->cost[k - 2];
 }
 
@@ -5251,6 +5257,26 @@ static uint32_t pti_write_leaf(pti_wide_builder *b, const pti_binary *leaf)
     return reference | PTI_SPHERES;
 }
 
+/* The children of node n, and their count. What has most area for each of its primitives comes last: shadow rays begin there, since
+   it is likely to be hit and soon asked. */
+static int pti_children(const pti_binary *nodes, uint32_t n, uint32_t *children)
+{
+    const int count = pti_gather(nodes, n, 8, children, 0);
+    float area[8];
+    int i, j;
+    for (i = 0; i < count; i++) {
+        const uint32_t child = children[i];
+        const float a = pti_node_area(&nodes[child]) / (float)nodes[child].count;
+        for (j = i; j > 0 && area[j - 1] > a; j--) {
+            area[j] = area[j - 1];
+            children[j] = children[j - 1];
+        }
+        area[j] = a;
+        children[j] = child;
+    }
+    return count;
+}
+
 /* Writes, or counts, subtree n: a node, its leaves, what is below it. Returns the reference. */
 static uint32_t pti_write_tree(pti_wide_builder *b, uint32_t n)
 {
@@ -5260,7 +5286,7 @@ static uint32_t pti_write_tree(pti_wide_builder *b, uint32_t n)
     int count, i, k, inner;
     if (b->nodes[n].child == 0) return pti_write_leaf(b, &b->nodes[n]);
     b->used += sizeof *out;
-    count = pti_gather(b->nodes, n, 8, children, 0);
+    count = pti_children(b->nodes, n, children);
     for (i = 0; out && i < 8; i++) {
         out->child[i] = out->unused[i] = 0;
         for (k = 0; k < 3; k++) {
@@ -5347,7 +5373,7 @@ static void pti_write_things(pti_wide_builder *b, pt_wide *wide)
     b->used += sizeof *out;
     if (!out) return;
     *out = *root;
-    count = pti_gather(b->nodes, 0, 8, children, 0);
+    count = pti_children(b->nodes, 0, children);
     for (i = 0; i < count; i++) {
         if (b->nodes[children[i]].first >= b->walls) continue;
         out->child[i] = 0;
@@ -5569,9 +5595,14 @@ PTI_INLINE8 pti_f8 pti_depth_lanes(const pti_edges8 *e, const pti_ray *r, const 
     return pti_f8_flip(depth, sum);
 }
 
+/* Where eight triangles are hit: at t with t |d.z| det = depth, up to off. */
+typedef struct pti_depths8 {
+    pti_lanes depth, det, off;
+} pti_depths8;
+
 /* Which of eight triangles may be hit by the limit? *sure: which certainly are; both bounds are at least 100 times what
    pti_depth_error allows for. */
-PTI_INLINE unsigned pti_triangle_lanes(const pti_triangle8 *p, const pti_ray *r, const pti_ray8 *w, float limit, unsigned *sure)
+PTI_INLINE unsigned pti_triangle_lanes(const pti_triangle8 *p, const pti_ray *r, const pti_ray8 *w, float limit, unsigned *sure, pti_depths8 *at)
 {
     const pti_f8 zero = pti_f8_set(0);
     pti_edges8 e;
@@ -5588,6 +5619,9 @@ PTI_INLINE unsigned pti_triangle_lanes(const pti_triangle8 *p, const pti_ray *r,
         const pti_f8 inside = pti_f8_sub(pti_f8_max(e.low, pti_f8_sub(zero, e.high)), e.error);
         lanes &= pti_m8_bits(pti_f8_le(zero, pti_f8_min(before, pti_f8_add(depth, off))));
         *sure = pti_m8_bits(pti_f8_lt(zero, pti_f8_min(inside, clear)));
+        at->depth.f = depth;
+        at->det.f = det;
+        at->off.f = off;
     }
     return lanes;
 }
@@ -5642,7 +5676,8 @@ PTI_INLINE pti_waiting pti_child(const pt_wide *tree, const pti_node8 *n, int i,
     return (uint64_t)begin->bits[i] << 32 | n->child[i];
 }
 
-/* The nearest of the children in `lanes`, two or more; the others wait, the nearest of them on top. any: in any order. */
+/* The nearest of the children in `lanes`, two or more; the others wait, the nearest of them on top. any: the last of them is
+   taken, the others wait as they are. */
 PTI_INLINE uint32_t pti_choose(const pt_wide *tree, const pti_node8 *n, unsigned lanes, const pti_lanes *begin, pti_waiting *stack,
                                int *top, int any)
 {
@@ -5691,7 +5726,7 @@ PTI_INLINE int pti_keep_sure(pti_d3 a, pti_d3 b, pti_d3 c, int half, int id, pti
 }
 
 /* Tests a lane as pti_test does; the corners of a triangle are at hand. */
-PTI_INLINE int pti_test_lane(const pt_scene *scene, const pti_ray *r, const pti_triangle8 *p, int i, int sure, pti_best *best)
+PTI_INLINE int pti_test_lane(const pt_scene *scene, const pti_ray *r, const pti_triangle8 *p, int i, pti_best *best)
 {
     const int id = (int)p->id[i];
     pti_d3 a, b, c;
@@ -5700,23 +5735,60 @@ PTI_INLINE int pti_test_lane(const pt_scene *scene, const pti_ray *r, const pti_
     a = pti_shear_lane(r, &p->v[0][i]);
     b = pti_shear_lane(r, &p->v[3][i]);
     c = pti_shear_lane(r, &p->v[6][i]);
-    if (sure) return pti_keep_sure(a, b, c, 0, id, best);
     return pti_sheared_triangle(r, a, b, c, pti_before(best, id), &t, &u, &v) && pti_keep(best, id, t, u, v);
 }
 
-PTI_INLINE int pti_test_leaf(const pt_scene *scene, uint32_t leaf, const pti_ray *r, const pti_ray8 *w, float limit, pti_best *best, int any)
+/* A triangle that is hit for certain, whose numbers wait until it is known that nothing nearer is hit: not before `from`. */
+typedef struct pti_later {
+    const pti_triangle8 *leaf; /* NULL: none                                                               */
+    int lane;
+    float from;
+} pti_later;
+
+PTI_INLINE void pti_keep_later(const pti_ray *r, const pti_later *h, pti_best *best)
+{
+    const pti_triangle8 *p = h->leaf;
+    const int i = h->lane;
+    pti_keep_sure(pti_shear_lane(r, &p->v[0][i]), pti_shear_lane(r, &p->v[3][i]), pti_shear_lane(r, &p->v[6][i]), 0, (int)p->id[i], best);
+}
+
+/* Lane i is hit for certain: it takes the place of the one that waits, which is done with if it is behind, else kept now, as
+   rounding may decide between them. The second `off` is more than what is rounded here. */
+PTI_INLINE void pti_put_off(const pti_triangle8 *p, int i, const pti_depths8 *at, const pti_ray *r, const pti_ray8 *w, float *limit,
+                            pti_later *h, pti_best *best)
+{
+    const float inverse = 1 / (at->det.v[i] * fabsf(w->d[r->kz])), depth = at->depth.v[i], off = 2 * at->off.v[i];
+    const float from = (depth - off) * inverse, to = (depth + off) * inverse;
+    if (from > *limit) return;
+    if (h->leaf && !(to < h->from)) pti_keep_later(r, h, best);
+    h->leaf = p;
+    h->lane = i;
+    h->from = from;
+    if (to < *limit) *limit = to;
+}
+
+/* Tests what a leaf holds; any: is something hit? Else *limit is lowered to what is found. */
+PTI_INLINE int pti_test_leaf(const pt_scene *scene, uint32_t leaf, const pti_ray *r, const pti_ray8 *w, float *limit, pti_later *h, pti_best *best,
+                             int any)
 {
     const void *p = pti_place(&scene->wide, leaf);
     const int flat = (leaf & 7) == PTI_TRIANGLES;
-    unsigned sure = 0, lanes = flat ? pti_triangle_lanes((const pti_triangle8 *)p, r, w, limit, &sure)
-                                    : pti_m8_bits(pti_f8_le(pti_sphere_lanes((const pti_sphere8 *)p, w), pti_f8_set(limit)));
+    pti_depths8 at;
+    unsigned sure = 0, lanes = flat ? pti_triangle_lanes((const pti_triangle8 *)p, r, w, *limit, &sure, &at)
+                                    : pti_m8_bits(pti_f8_le(pti_sphere_lanes((const pti_sphere8 *)p, w), pti_f8_set(*limit)));
     int found = 0;
     if (any && sure) return 1;
     for (; lanes; lanes &= lanes - 1) {
         const int i = pti_lowest_bit(lanes);
-        found |= flat ? pti_test_lane(scene, r, (const pti_triangle8 *)p, i, sure >> i & 1, best)
-                      : pti_test(scene, r, (int)((const pti_sphere8 *)p)->id[i], best);
-        if (any && found) return 1;
+        if ((sure >> i & 1) && ((const pti_triangle8 *)p)->id[i] < scene->wide.triangles) {
+            pti_put_off((const pti_triangle8 *)p, i, &at, r, w, limit, h, best);
+            found = 1;
+        } else if (flat ? pti_test_lane(scene, r, (const pti_triangle8 *)p, i, best) : pti_test(scene, r, (int)((const pti_sphere8 *)p)->id[i], best)) {
+            const float end = pti_ray8_limit(w, best->t);
+            if (any) return 1;
+            *limit = end < *limit ? end : *limit;
+            found = 1;
+        }
     }
     return found;
 }
@@ -5726,6 +5798,7 @@ PTI_INLINE int pti_traverse_wide(const pt_scene *scene, const pti_ray *r, const 
 {
     const pt_wide *tree = &scene->wide;
     pti_waiting stack[PTI_WAITING];
+    pti_later later = {NULL, 0, 0};
     uint32_t limit_bits;
     float limit = pti_ray8_limit(w, best->t);
     int top = 0, found = 0;
@@ -5744,14 +5817,16 @@ PTI_INLINE int pti_traverse_wide(const pt_scene *scene, const pti_ray *r, const 
                 pti_fetch(tree->arena + ((size_t)at << 3));
                 continue;
             }
-        } else if (pti_test_leaf(scene, at, r, w, limit, best, any)) {
+        } else if (pti_test_leaf(scene, at, r, w, &limit, &later, best, any)) {
             if (any) return 1;
             found = 1;
-            limit = pti_ray8_limit(w, best->t);
             memcpy(&limit_bits, &limit, sizeof limit_bits);
         }
         do {
-            if (top == 0) return found;
+            if (top == 0) {
+                if (later.leaf) pti_keep_later(r, &later, best);
+                return found;
+            }
             top--;
         } while (!any && stack[top] >> 32 > limit_bits);
         at = (uint32_t)stack[top];
@@ -15171,8 +15246,10 @@ PTDEF const pt_scene_entry *pt_scene_find(const char *name)
 /*
    VERSION HISTORY
 
+   0.6.1 (2026-11-23)  the wide tree computes what a ray hits in double once, when nothing nearer is left, and shadow rays
+                       begin with large primitives: the same hits in 0.8 to 0.95 of the time.
    0.6.0 (2026-11-23)  lockstep asks for the walls of a room in lanes, and the tree only for what is not a wall: meshes in
-                       rooms take about 0.6 of the time
+                       rooms take about 0.6 of the time.
    0.5.1 (2026-11-22)  lockstep mended: mirrors and glass seen from behind their shading normals, pictures that hung on
                        the size of tiles by a bit, rooms below 1e-15, small lamps far off.
    0.5.0 (2026-11-22)  paths walk in lockstep in scenes of any size, with metal, rough and smooth, and shading normals.

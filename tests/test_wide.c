@@ -138,10 +138,10 @@ static void lanes_together(void)
 
 /* ---- scenes ------------------------------------------------------------------------------------------------ */
 
-enum { TRIANGLES, QUADS, PARALLELOGRAMS, SPHERES, MIXED, BALL, SOUP, SLIVERS, FLAT, IDENTICAL, GIANT, CHAIN, ROOM, FURNISHED, KINDS };
+enum { TRIANGLES, QUADS, PARALLELOGRAMS, SPHERES, MIXED, BALL, SOUP, SLIVERS, FLAT, IDENTICAL, LAYERS, GIANT, CHAIN, ROOM, FURNISHED, KINDS };
 static const char *const NAMES[KINDS] = {"triangles", "quads",   "parallelograms", "spheres",   "all shapes",
                                          "a ball",    "a soup",  "slivers",        "coplanar",  "identical",
-                                         "a giant among dwarfs", "a chain of 2^-i", "a room",      "a room with a ball"};
+                                         "layers",    "a giant among dwarfs", "a chain of 2^-i", "a room",      "a room with a ball"};
 
 static void add_ball(pt_scene *s, int rings, pt_vec3 c, double r, int m)
 {
@@ -170,7 +170,7 @@ static void add_thing(pt_scene *s, int kind, int k, pt_vec3 at, double scale, pt
 {
     const pt_vec3 a = pt_v3_add(at, in_cube(rng, scale)), b = in_cube(rng, 0.4 * scale), c = in_cube(rng, 0.4 * scale);
     const pt_vec3 e = pt_v3_add(a, b), f = pt_v3_add(a, c);
-    const double size = between(rng, 0.01, 0.4) * scale, step = ldexp(scale, -(k % 100));
+    const double size = between(rng, 0.01, 0.4) * scale, step = ldexp(scale, -(k % 100)), layer = ldexp(k * 7 % 9 * scale, -23);
     switch (kind == MIXED ? k % 4 : kind) {
     case TRIANGLES:
     case SOUP: pt_add_triangle(s, a, e, f, m); break;
@@ -181,6 +181,9 @@ static void add_thing(pt_scene *s, int kind, int k, pt_vec3 at, double scale, pt
     case FLAT: pt_add_triangle(s, pt_v3(a.x, a.y, at.z), pt_v3(e.x, e.y, at.z), pt_v3(f.x, f.y, at.z), m); break;
     case IDENTICAL:
         pt_add_triangle(s, pt_v3_add(at, v3(-scale, -scale, 0)), pt_v3_add(at, v3(scale, -scale, 0.1 * scale)), pt_v3_add(at, v3(0, scale, 0.3 * scale)), m);
+        break;
+    case LAYERS: /* so near each other that rounding in float may decide which is nearer */
+        pt_add_triangle(s, pt_v3_add(at, v3(-scale, -scale, layer)), pt_v3_add(at, v3(scale, -scale, layer + 0.1 * scale)), pt_v3_add(at, v3(0, scale, layer + 0.3 * scale)), m);
         break;
     case GIANT:
         if (k % 100 == 7) pt_add_triangle(s, pt_v3_add(at, v3(-1e5 * scale, -1e5 * scale, 0)), pt_v3_add(at, v3(1e5 * scale, 0, 0.1 * scale)), pt_v3_add(at, v3(0, 1e5 * scale, 0)), m);
@@ -486,6 +489,7 @@ static void bounds_of_block(const pti_triangle8 *p, const pti_ray *r, const pti_
     const float limit = pti_ray8_limit(w, end);
     pti_edges8 e;
     pti_lanes u, v, x, error, t, det, off;
+    pti_depths8 at;
     unsigned sure = 0, may;
     pti_f8 bound, all;
     int i;
@@ -497,7 +501,7 @@ static void bounds_of_block(const pti_triangle8 *p, const pti_ray *r, const pti_
     t.f = pti_depth_lanes(&e, r, w, &all, &bound);
     off.f = bound;
     det.f = all;
-    may = pti_triangle_lanes(p, r, w, limit, &sure);
+    may = pti_triangle_lanes(p, r, w, limit, &sure, &at);
     for (i = 0; i < 8; i++) {
         const pti_d3 a = pti_shear_lane(r, &p->v[0][i]), b = pti_shear_lane(r, &p->v[3][i]), c = pti_shear_lane(r, &p->v[6][i]);
         const double du = pti_edge(c.x, b.y, c.y, b.x), dv = pti_edge(a.x, c.y, a.y, c.x), dw = pti_edge(b.x, a.y, b.y, a.x);
@@ -511,6 +515,12 @@ static void bounds_of_block(const pti_triangle8 *p, const pti_ray *r, const pti_
             sum->depth = ratio((double)t.v[i] - depth * fabs(r->d[r->kz]) * (double)det.v[i], (double)off.v[i], sum->depth);
             sum->depths++;
             sum->wrong += !(may >> i & 1);
+            if (sure >> i & 1) {
+                pti_later later = {NULL, 0, 0};
+                float known = limit;
+                pti_put_off(p, i, &at, r, w, &known, &later, NULL);
+                sum->wrong += later.leaf != p || later.lane != i || !((double)later.from < depth * w->unit && depth * w->unit < (double)known);
+            }
         } else {
             sum->wrong += (int)(sure >> i & 1);
         }
