@@ -5657,17 +5657,21 @@ PTI_INLINE const unsigned char *pti_place(const pt_wide *tree, uint32_t referenc
     return tree->arena + ((size_t)(reference & ~7u) << 3);
 }
 
-PTI_INLINE void pti_fetch(const unsigned char *p)
+PTI_INLINE void pti_fetch_line(const void *p)
 {
 #if defined(__GNUC__)
     __builtin_prefetch(p);
-    __builtin_prefetch(p + 64);
-    __builtin_prefetch(p + 128);
-    __builtin_prefetch(p + 192);
-    __builtin_prefetch(p + 256);
 #else
     (void)p;
 #endif
+}
+PTI_INLINE void pti_fetch(const unsigned char *p)
+{
+    pti_fetch_line(p);
+    pti_fetch_line(p + 64);
+    pti_fetch_line(p + 128);
+    pti_fetch_line(p + 192);
+    pti_fetch_line(p + 256);
 }
 
 PTI_INLINE pti_waiting pti_child(const pt_wide *tree, const pti_node8 *n, int i, const pti_lanes *begin)
@@ -5772,18 +5776,21 @@ PTI_INLINE int pti_test_leaf(const pt_scene *scene, uint32_t leaf, const pti_ray
                              int any)
 {
     const void *p = pti_place(&scene->wide, leaf);
+    const pti_triangle8 *triangles = (const pti_triangle8 *)p;
     const int flat = (leaf & 7) == PTI_TRIANGLES;
     pti_depths8 at;
-    unsigned sure = 0, lanes = flat ? pti_triangle_lanes((const pti_triangle8 *)p, r, w, *limit, &sure, &at)
+    unsigned sure = 0, lanes = flat ? pti_triangle_lanes(triangles, r, w, *limit, &sure, &at)
                                     : pti_m8_bits(pti_f8_le(pti_sphere_lanes((const pti_sphere8 *)p, w), pti_f8_set(*limit)));
     int found = 0;
     if (any && sure) return 1;
     for (; lanes; lanes &= lanes - 1) {
         const int i = pti_lowest_bit(lanes);
-        if ((sure >> i & 1) && ((const pti_triangle8 *)p)->id[i] < scene->wide.triangles) {
-            pti_put_off((const pti_triangle8 *)p, i, &at, r, w, limit, h, best);
+        if ((sure >> i & 1) && triangles->id[i] < scene->wide.triangles) {
+            pti_fetch_line(&scene->primitives[triangles->id[i]]); /* for pti_fill */
+            pti_fetch_line(&scene->triangles[triangles->id[i]]);
+            pti_put_off(triangles, i, &at, r, w, limit, h, best);
             found = 1;
-        } else if (flat ? pti_test_lane(scene, r, (const pti_triangle8 *)p, i, best) : pti_test(scene, r, (int)((const pti_sphere8 *)p)->id[i], best)) {
+        } else if (flat ? pti_test_lane(scene, r, triangles, i, best) : pti_test(scene, r, (int)((const pti_sphere8 *)p)->id[i], best)) {
             const float end = pti_ray8_limit(w, best->t);
             if (any) return 1;
             *limit = end < *limit ? end : *limit;
