@@ -5012,8 +5012,9 @@ typedef struct pti_wide_builder {
     float wall, cut;        /* half of the surface of a wall's box, and of a leaf that is cut              */
     uint32_t triangles, flats; /* lanes below these hold triangles, triangles and halves                   */
     uint32_t walls;         /* the first boxes are these lanes' of walls                                   */
+    uint32_t top[8];        /* the children of the root                                                    */
     uint32_t piece_size;
-    int piece_count;
+    int piece_count, top_count;
     pti_piece pieces[PTI_PIECES];
 } pti_wide_builder;
 
@@ -5257,8 +5258,8 @@ static uint32_t pti_write_leaf(pti_wide_builder *b, const pti_binary *leaf)
     return reference | PTI_SPHERES;
 }
 
-/* The children of node n, and their count. What has most area for each of its primitives comes last: shadow rays begin there, since
-   it is likely to be hit and soon asked. */
+/* The children of node n, and their count. What has most area for each of its lanes comes last: shadow rays begin there, since
+   it is likely to be hit and quick to ask. */
 static int pti_children(const pti_binary *nodes, uint32_t n, uint32_t *children)
 {
     const int count = pti_gather(nodes, n, 8, children, 0);
@@ -5287,6 +5288,10 @@ static uint32_t pti_write_tree(pti_wide_builder *b, uint32_t n)
     if (b->nodes[n].child == 0) return pti_write_leaf(b, &b->nodes[n]);
     b->used += sizeof *out;
     count = pti_children(b->nodes, n, children);
+    if (n == 0) {
+        memcpy(b->top, children, (size_t)count * sizeof *children);
+        b->top_count = count;
+    }
     for (i = 0; out && i < 8; i++) {
         out->child[i] = out->unused[i] = 0;
         for (k = 0; k < 3; k++) {
@@ -5362,8 +5367,7 @@ static void pti_write_things(pti_wide_builder *b, pt_wide *wide)
 {
     const pti_node8 *root = (const pti_node8 *)(const void *)b->arena; /* the first of the arena */
     pti_node8 *out = b->arena ? (pti_node8 *)(void *)(b->arena + b->used) : NULL;
-    uint32_t children[8];
-    int count, i, k;
+    int i, k;
     wide->things = wide->root;
     if (b->walls == 0 || b->walls == b->nodes[0].count) {
         wide->wall_count = 0;
@@ -5373,9 +5377,8 @@ static void pti_write_things(pti_wide_builder *b, pt_wide *wide)
     b->used += sizeof *out;
     if (!out) return;
     *out = *root;
-    count = pti_children(b->nodes, 0, children);
-    for (i = 0; i < count; i++) {
-        if (b->nodes[children[i]].first >= b->walls) continue;
+    for (i = 0; i < b->top_count; i++) {
+        if (b->nodes[b->top[i]].first >= b->walls) continue;
         out->child[i] = 0;
         for (k = 0; k < 3; k++) {
             out->box[k][i] = HUGE_VALF;
@@ -5600,8 +5603,8 @@ typedef struct pti_depths8 {
     pti_lanes depth, det, off;
 } pti_depths8;
 
-/* Which of eight triangles may be hit by the limit? *sure: which certainly are; both bounds are at least 100 times what
-   pti_depth_error allows for. */
+/* Which of eight triangles may be hit by the limit? *sure: which of these certainly are; both bounds are at least 100 times what
+   pti_depth_error allows for. If there are none, *sure and *at are left alone. */
 PTI_INLINE unsigned pti_triangle_lanes(const pti_triangle8 *p, const pti_ray *r, const pti_ray8 *w, float limit, unsigned *sure, pti_depths8 *at)
 {
     const pti_f8 zero = pti_f8_set(0);
@@ -5756,10 +5759,11 @@ PTI_INLINE void pti_keep_later(const pti_ray *r, const pti_later *h, pti_best *b
     pti_keep_sure(pti_shear_lane(r, &p->v[0][i]), pti_shear_lane(r, &p->v[3][i]), pti_shear_lane(r, &p->v[6][i]), 0, (int)p->id[i], best);
 }
 
-/* Lane i is hit for certain: it takes the place of the one that waits, which is done with if it is behind, else kept now, as
-   rounding may decide between them. The second `off` is more than what is rounded here. */
-PTI_INLINE void pti_put_off(const pti_triangle8 *p, int i, const pti_depths8 *at, const pti_ray *r, const pti_ray8 *w, float *limit,
-                            pti_later *h, pti_best *best)
+/* Lane i is hit for certain, at a t between `from` and `to`: the second `off` is more than what is rounded here, 5 u of what is
+   below 2 S. Behind the limit it is dropped: then something nearer is known. If it is nearer for certain than the one that
+   waits, that one is dropped; else that one is computed now, and this one waits. */
+PTI_INLINE void pti_put_off(const pt_scene *scene, const pti_triangle8 *p, int i, const pti_depths8 *at, const pti_ray *r, const pti_ray8 *w,
+                            float *limit, pti_later *h, pti_best *best)
 {
     const float inverse = 1 / (at->det.v[i] * fabsf(w->d[r->kz])), depth = at->depth.v[i], off = 2 * at->off.v[i];
     const float from = (depth - off) * inverse, to = (depth + off) * inverse;
@@ -5768,10 +5772,12 @@ PTI_INLINE void pti_put_off(const pti_triangle8 *p, int i, const pti_depths8 *at
     h->leaf = p;
     h->lane = i;
     h->from = from;
+    pti_fetch_line(&scene->primitives[p->id[i]]); /* for pti_fill; where no triangle was without area, its index is this number */
+    pti_fetch_line(&scene->triangles[p->id[i]]);
     if (to < *limit) *limit = to;
 }
 
-/* Tests what a leaf holds; any: is something hit? Else *limit is lowered to what is found. */
+/* Tests what a leaf holds: is anything found? any: the first that is found will do. Else *limit is lowered to the nearest. */
 PTI_INLINE int pti_test_leaf(const pt_scene *scene, uint32_t leaf, const pti_ray *r, const pti_ray8 *w, float *limit, pti_later *h, pti_best *best,
                              int any)
 {
@@ -5786,9 +5792,7 @@ PTI_INLINE int pti_test_leaf(const pt_scene *scene, uint32_t leaf, const pti_ray
     for (; lanes; lanes &= lanes - 1) {
         const int i = pti_lowest_bit(lanes);
         if ((sure >> i & 1) && triangles->id[i] < scene->wide.triangles) {
-            pti_fetch_line(&scene->primitives[triangles->id[i]]); /* for pti_fill */
-            pti_fetch_line(&scene->triangles[triangles->id[i]]);
-            pti_put_off(triangles, i, &at, r, w, limit, h, best);
+            pti_put_off(scene, triangles, i, &at, r, w, limit, h, best);
             found = 1;
         } else if (flat ? pti_test_lane(scene, r, triangles, i, best) : pti_test(scene, r, (int)((const pti_sphere8 *)p)->id[i], best)) {
             const float end = pti_ray8_limit(w, best->t);
@@ -5800,7 +5804,7 @@ PTI_INLINE int pti_test_leaf(const pt_scene *scene, uint32_t leaf, const pti_ray
     return found;
 }
 
-/* Walks the tree from a reference on, near children first; any = 1 stops at the first hit. */
+/* Walks the tree from a reference on, near children first; any = 1: the last children first, until something is hit. */
 PTI_INLINE int pti_traverse_wide(const pt_scene *scene, const pti_ray *r, const pti_ray8 *w, uint32_t at, pti_best *best, int any)
 {
     const pt_wide *tree = &scene->wide;

@@ -483,7 +483,7 @@ static double ratio(double error, double bound, double so_far)
 }
 
 /* A block of eight triangles against a ray in double. */
-static void bounds_of_block(const pti_triangle8 *p, const pti_ray *r, const pti_ray8 *w, worst *sum)
+static void bounds_of_block(const pt_scene *s, const pti_triangle8 *p, const pti_ray *r, const pti_ray8 *w, worst *sum)
 {
     const double end = r->end < 3e38 ? r->end : 3e38;
     const float limit = pti_ray8_limit(w, end);
@@ -518,7 +518,7 @@ static void bounds_of_block(const pti_triangle8 *p, const pti_ray *r, const pti_
             if (sure >> i & 1) {
                 pti_later later = {NULL, 0, 0};
                 float known = limit;
-                pti_put_off(p, i, &at, r, w, &known, &later, NULL);
+                pti_put_off(s, p, i, &at, r, w, &known, &later, NULL);
                 sum->wrong += later.leaf != p || later.lane != i || !((double)later.from < depth * w->unit && depth * w->unit < (double)known);
             }
         } else {
@@ -548,7 +548,7 @@ static void bounds_of_triangles(void)
                 do at = n->child[pt_pcg32_next(&rng) % 8];
                 while (at == 0);
             }
-            if ((at & 7) == PTI_TRIANGLES) bounds_of_block((const pti_triangle8 *)(const void *)pti_place(&s.wide, at), &r, &w, &sum);
+            if ((at & 7) == PTI_TRIANGLES) bounds_of_block(&s, (const pti_triangle8 *)(const void *)pti_place(&s.wide, at), &r, &w, &sum);
         }
         pt_scene_free(&s);
     }
