@@ -4965,9 +4965,9 @@ static int pti_build_small(const pt_scene *scene, pt_wide *wide, uint32_t flats)
 
 /* BUILDING. First a binary tree as in [PT-07], by the surface area heuristic with bins; but eight triangles cost what one
    does, so a side costs its area times ceil(n / 8), and eight are a leaf, but for large ones: walls are better off apart, and
-   are parted from the rest first. Then, of all ways in which nodes of up to eight
-   children can be cut from that tree, the one whose nodes and leaves have the least area together: with c(n, k) the least cost
-   of subtree n in at most k slots of a parent [Yli17],
+   are parted from the rest first. Then, of all ways in which nodes of up to eight children can be cut from that tree, the one
+   whose nodes and leaves have the least area together: with c(n, k) the least cost of subtree n in at most k slots of a
+   parent [Yli17],
 
        c(n, 1) = A(n) for a leaf,    A(n) + min_j c(left, j) + c(right, 8 - j)    for a node of its own,
        c(n, k) = min( c(n, k-1), min_j c(left, j) + c(right, k-j) ).
@@ -5148,10 +5148,9 @@ static void pti_collapse(const pti_wide_builder *b, pti_binary *n)
     for (k = 2; k <= 7; k++) n->cost[k - 1] = best[k] < n->cost[k - 2] ? best[k] : n->cost[k - 2];
 }
 
-/* Node n, whose range is known, and all below it. pieces: what is small is left for later. First walls
-   are parted from the rest, and then flat primitives from spheres. Below the top no n boxes make
-   more than 5 n / 18 leaves: four and more are on each side of a plane, and where none is found, 18 are 16, of four leaves,
-   and 2. */
+/* Node n, whose range is known, and all below it. pieces: what is small is left for later. First walls are parted from the
+   rest, and then flat primitives from spheres. Below the top no n boxes make more than 5 n / 18 leaves: four and more are on
+   each side of a plane, and where none is found, 18 are 16, of four leaves, and 2. */
 static void pti_build_binary(pti_wide_builder *b, uint32_t n, const pti_joined *all, int depth, int pieces)
 {
     pti_binary *node = &b->nodes[n];
@@ -15258,7 +15257,7 @@ PTDEF const pt_scene_entry *pt_scene_find(const char *name)
    VERSION HISTORY
 
    0.6.1 (2026-11-23)  the wide tree computes what a ray hits in double once, when nothing nearer is left, and shadow rays
-                       begin with large primitives: the same hits in 0.8 to 0.95 of the time.
+                       begin with large primitives: the same hits, for the rays of a room in 0.8 to 0.95 of the time.
    0.6.0 (2026-11-23)  lockstep asks for the walls of a room in lanes, and the tree only for what is not a wall: meshes in
                        rooms take about 0.6 of the time.
    0.5.1 (2026-11-22)  lockstep mended: mirrors and glass seen from behind their shading normals, pictures that hung on
