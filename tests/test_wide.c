@@ -615,6 +615,117 @@ static void bounds_of_planes(void)
     pt_check(sum.wrong == 0, "what lanes tell of planes", "%d are told to begin behind the hit, to be hit, or to be the wrong half", sum.wrong);
 }
 
+/* ---- partings ------------------------------------------------------------------------------------------------ */
+
+/* What a list of boxes costs whose `count` members are lanes `who`. */
+static float list_cost(const pti_lanes *boxes, const uint32_t *who, uint32_t count, pti_joined *all)
+{
+    pti_lanes members[256];
+    uint32_t i;
+    for (i = 0; i < count; i++) members[i] = boxes[who[i]];
+    pti_join(members, count, all);
+    return pti_box_area(all->box.v) * (float)((count + 7) / 8);
+}
+
+/* Along an axis: short lists are cut anywhere, in the order of their centres, others between bins. The least cost of all. */
+static float cheapest(const pti_lanes *boxes, uint32_t n, const float *centres, int axis, uint32_t few)
+{
+    const float lo = -centres[axis], extent = centres[4 + axis] - lo;
+    uint32_t order[256], i, j;
+    float place[256], best = HUGE_VALF;
+    pti_joined all;
+    if (extent == 0) return best;
+    for (i = 0; i < n; i++) {
+        const float centre = boxes[i].v[4 + axis] - boxes[i].v[axis];
+        place[i] = n <= PTI_SHORT ? centre : floorf((centre - lo) * (PTI_WIDE_BINS * (1 - 4 * PTI_U) / extent));
+        for (j = i; j > 0 && place[order[j - 1]] > place[i]; j--) order[j] = order[j - 1];
+        order[j] = i;
+    }
+    for (i = few; i + few <= n; i++) {
+        float cost;
+        if (n > PTI_SHORT && place[order[i - 1]] == place[order[i]]) continue;
+        cost = list_cost(boxes, order, i, &all);
+        cost += list_cost(boxes, order + i, n - i, &all);
+        best = cost < best ? cost : best;
+    }
+    return best;
+}
+
+/* kind 1: all centres in a plane; 2: at one point. Coordinates are multiples of 2^-9, so that centres differ well or not at all. */
+static void fill_list(pti_lanes *boxes, uint32_t n, int kind, pt_pcg32 *rng)
+{
+    uint32_t i;
+    int k;
+    for (i = 0; i < n; i++) {
+        for (k = 0; k < 3; k++) {
+            const float spread = kind == 2 || (kind == 1 && k == 1) ? 0 : 1024;
+            const float centre = floorf(spread * (float)pt_pcg32_double(rng)) / 512, half = floorf(64 * (float)pt_pcg32_double(rng)) / 512;
+            boxes[i].v[k] = half - centre;
+            boxes[i].v[4 + k] = centre + half;
+        }
+        boxes[i].bits[3] = i;
+        boxes[i].v[7] = 0;
+    }
+}
+
+static int same_box(const float *a, const float *b)
+{
+    return a[0] == b[0] && a[1] == b[1] && a[2] == b[2] && a[4] == b[4] && a[5] == b[5] && a[6] == b[6];
+}
+
+/* Finds the best parting and carries it out: 0, or what is wrong. */
+static const char *part_list(uint32_t n, int kind, uint32_t few, pt_pcg32 *rng)
+{
+    static pti_wide_builder b;
+    pti_lanes boxes[256], moved[256];
+    pti_joined all, side[2], expected[2];
+    pti_parting p = {-1, 0, 0, 0, HUGE_VALF, 0};
+    uint32_t who[256], i, middle;
+    float best = HUGE_VALF, cost;
+    int k;
+    fill_list(boxes, n, kind, rng);
+    memcpy(moved, boxes, sizeof moved);
+    pti_join(boxes, n, &all);
+    for (k = 0; k < 3; k++) best = fminf(best, cheapest(boxes, n, all.centres.v, k, few));
+    b.boxes = moved;
+    p.middle = (n / 2 + 7) / 8 * 8;
+    pti_find_parting(&b, 0, n, all.centres.v, few, &p);
+    middle = pti_part(&b, 0, n, &p, side);
+    if (middle < 1 || middle >= n) return "a side is empty";
+    for (i = 0; i < n; i++) who[i] = moved[i].bits[3];
+    for (i = 0; i < n; i++)
+        if (who[i] >= n || memcmp(&boxes[who[i]], &moved[i], sizeof *boxes)) return "a box has changed";
+    cost = list_cost(boxes, who, middle, &expected[0]);
+    cost += list_cost(boxes, who + middle, n - middle, &expected[1]);
+    for (k = 0; k < 2; k++)
+        if (!same_box(side[k].box.v, expected[k].box.v) || !same_box(side[k].centres.v, expected[k].centres.v)) return "the box of a side";
+    for (i = 0; i < n; i++) boxes[who[i]].bits[3] = n;
+    for (i = 0; i < n; i++)
+        if (boxes[i].bits[3] != n) return "a box is lost";
+    if (best == HUGE_VALF) return p.cost == best && middle == p.middle ? NULL : "centres at one point are halved";
+    if (middle < few || n - middle < few) return "too few on a side";
+    if (fabsf(p.cost - best) > 1e-6f * best) return "there is a cheaper one";
+    return fabsf(p.cost - cost) > 1e-6f * best ? "its cost" : NULL;
+}
+
+static void partings(void)
+{
+    static const char *const CENTRES[3] = {"anywhere", "in a plane", "at one point"};
+    pt_pcg32 rng = pt_pcg32_make(pt_test_seed(71), 1);
+    uint32_t n;
+    int kind, k;
+    for (kind = 0; kind < 3; kind++)
+        for (k = 0; k < 2; k++) {
+            const uint32_t few = k ? 4 : 1;
+            const char *wrong = NULL;
+            for (n = 9; n <= 256 && !wrong; n += n < 40 ? 1 : 13) {
+                int times;
+                for (times = 0; times < 20 && !wrong; times++) wrong = part_list(n, kind, few, &rng);
+            }
+            pt_check(!wrong, label("partings, centres %s, at least %u a side", CENTRES[kind], few), "%s, about %u boxes", wrong ? wrong : "", n);
+        }
+}
+
 /* ---- the structure ------------------------------------------------------------------------------------------- */
 
 typedef struct census {
@@ -797,6 +908,7 @@ static int wide(int argc, char **argv)
     PT_TEST_EXACT(folds);
     PT_TEST_EXACT(bounds_of_triangles);
     PT_TEST_EXACT(bounds_of_planes);
+    PT_TEST_EXACT(partings);
     PT_TEST_EXACT(structure);
     PT_TEST_EXACT(any_threads);
     PT_TEST_EXACT(bad_luck);
