@@ -4982,6 +4982,7 @@ static int pti_build_small(const pt_scene *scene, pt_wide *wide, uint32_t flats)
 #define PTI_CUT 0.1f        /* a leaf of more than a 30th of the surface of a cube around the scene is cut where that pays */
 #define PTI_WALL 0.03f      /* flat primitives whose box has a 100th of the surface of a cube around the scene are walls, */
 #define PTI_WALLS 32        /* unless there are more of them                                               */
+#define PTI_LONG 65536      /* of lists that are not shorter every fourth box is binned                    */
 #define PTI_SHORT 24        /* lists that are no longer are sorted instead, and cut anywhere               */
 
 /* Some boxes joined, and {-least, greatest} of twice their centres. */
@@ -5086,11 +5087,12 @@ PTI_INLINE void pti_put_in_bins(pti_wide_bins *bins, const pti_lanes *box, const
     pti_put_in_bin(&bins[2], place.v[6], box);
 }
 
-/* A box that falls where the last one fell waits for it; so in long lists every second box goes to bins of its own, which are
-   joined in the end. */
+/* A box that falls where the last one fell waits for it; so every second box goes to bins of its own, which are joined in the
+   end, unless there are few. Of a very long list a fourth tells where to part it as well as all. */
 static void pti_fill_bins(const pti_lanes *boxes, uint32_t n, const pti_lanes *from, const pti_lanes *scale, pti_wide_bins *bins)
 {
     pti_wide_bins more[3], *odd = n < 64 ? bins : more;
+    const uint32_t step = n < PTI_LONG ? 1 : 4;
     uint32_t i;
     int k, j;
     for (k = 0; k < 3; k++)
@@ -5098,9 +5100,9 @@ static void pti_fill_bins(const pti_lanes *boxes, uint32_t n, const pti_lanes *f
             odd[k].box[j].f = bins[k].box[j].f = pti_f8_set(-HUGE_VALF);
             odd[k].count[j] = bins[k].count[j] = 0;
         }
-    for (i = 0; i + 1 < n; i += 2) {
+    for (i = 0; i + step < n; i += 2 * step) {
         pti_put_in_bins(bins, &boxes[i], from, scale);
-        pti_put_in_bins(odd, &boxes[i + 1], from, scale);
+        pti_put_in_bins(odd, &boxes[i + step], from, scale);
     }
     if (i < n) pti_put_in_bins(bins, &boxes[i], from, scale);
     for (k = 0; k < 3 && odd == more; k++)
