@@ -5045,7 +5045,7 @@ static void pti_sweep_blocks(const pti_wide_bins *bins, int count, uint32_t few,
     const pti_f8 none = pti_f8_set(-HUGE_VALF);
     float right[PTI_SHORT];
     pti_f8 joined = none;
-    pti_lanes box;          /* written, and never read as lanes: compilers would put it together from its numbers */
+    pti_lanes box;          /* for numbers; what is joined stays in lanes                                  */
     uint32_t n = 0;
     int i;
     for (i = count - 1; i > 0; i--) {
@@ -5112,34 +5112,38 @@ static void pti_fill_bins(const pti_lanes *boxes, uint32_t n, const pti_lanes *f
         }
 }
 
+typedef union pti_keys {
+    pti_f8 f[PTI_SHORT / 8];
+    float v[PTI_SHORT];
+    uint32_t bits[PTI_SHORT];
+} pti_keys;
+
 /* Each box of a short list has a bin of its own: its rank is the number of lesser keys. Keys lie from 1 to 2 and end in the
    number of the box, so that no two are equal, nor lost where processors take what is very small for zero. */
 static void pti_sort_bins(const pti_lanes *boxes, uint32_t n, const pti_lanes *from, const pti_lanes *scale, pti_wide_bins *bins)
 {
     const pti_f8 one = pti_f8_set(1), zero = pti_f8_set(0);
-    pti_lanes key[3][PTI_SHORT / 8], rank;
+    pti_keys key[3];
+    pti_lanes rank;
     uint32_t i, j, k, eight;
     for (i = 0; i < (n + 7) / 8 * 8; i++) {
         pti_lanes place;
         place.f = pti_box_place(&boxes[i < n ? i : 0], from, scale);
         for (k = 0; k < 3; k++) {
-            pti_lanes *to = &key[k][i / 8];
-            to->v[i % 8] = 1 + place.v[4 + k];
-            to->bits[i % 8] = (to->bits[i % 8] & ~(uint32_t)31) | i;
+            key[k].v[i] = 1 + place.v[4 + k];
+            key[k].bits[i] = (key[k].bits[i] & ~(uint32_t)31) | i;
         }
     }
-    for (k = 0; k < 3; k++) {
-        const float *keys = key[k][0].v;
+    for (k = 0; k < 3; k++)
         for (eight = 0; eight < n; eight += 8) {
             rank.f = zero;
             for (j = 0; j < n; j++)
-                rank.f = pti_f8_add(rank.f, pti_f8_select(pti_f8_lt(pti_f8_set(keys[j]), key[k][eight / 8].f), one, zero));
+                rank.f = pti_f8_add(rank.f, pti_f8_select(pti_f8_lt(pti_f8_set(key[k].v[j]), key[k].f[eight / 8]), one, zero));
             for (i = eight; i < n && i < eight + 8; i++) {
                 bins[k].box[(int)rank.v[i - eight]] = boxes[i];
                 bins[k].count[i] = 1;
             }
         }
-    }
 }
 
 /* Improves on *best, a halving of infinite cost, if the centres differ. A short list is left in the order of the best axis, for
