@@ -4972,18 +4972,18 @@ static int pti_build_small(const pt_scene *scene, pt_wide *wide, uint32_t flats)
        c(n, 1) = A(n) for a leaf,    A(n) + min_j c(left, j) + c(right, 8 - j)    for a node of its own,
        c(n, k) = min( c(n, k-1), min_j c(left, j) + c(right, k-j) ).
 
-   Short lists are sorted rather than binned: bins part sixteen boxes in ten and six as easily as in eight and eight, which
-   leaves a quarter of the lanes empty. A box is kept as {-lo, hi}: one max of lanes joins two. The tree is the same for any number of threads: one splits
-   until pieces are small, and each piece is a task. */
+   Short lists are sorted rather than binned. Bins would as soon part sixteen boxes into ten and six as into eight and eight:
+   three leaves instead of two, with a third of the lanes empty. A box is kept as {-lo, hi}: one max of lanes joins two. The tree is the same for any number of threads: one thread
+   splits until pieces are small, and each piece is a task. */
 #define PTI_WIDE_BINS 16
 #define PTI_PIECES 256
 #define PTI_WIDE_DEPTH 32   /* deeper down lists are halved, and end within 28 levels                      */
-#define PTI_TOP 8           /* from this depth on no side of a plane has less than four boxes              */
+#define PTI_TOP 8           /* from this depth on no cut leaves less than four boxes on a side             */
 #define PTI_CUT 0.1f        /* a leaf of more than a 30th of the surface of a cube around the scene is cut where that pays */
 #define PTI_WALL 0.03f      /* flat primitives whose box has a 100th of the surface of a cube around the scene are walls, */
 #define PTI_WALLS 32        /* unless there are more of them                                               */
-#define PTI_LONG 65536      /* of lists that are not shorter every fourth box is binned                    */
-#define PTI_SHORT 24        /* lists that are no longer are sorted instead, and cut anywhere               */
+#define PTI_LONG 65536      /* of lists this long or longer every fifth box is binned                      */
+#define PTI_SHORT 24        /* lists of up to these are sorted, and cut anywhere: a multiple of 8, from 20 (pti_build_binary) to 32 */
 
 /* Some boxes joined, and {-least, greatest} of twice their centres. */
 typedef struct pti_joined {
@@ -5045,7 +5045,7 @@ static void pti_sweep_blocks(const pti_wide_bins *bins, int count, uint32_t few,
     const pti_f8 none = pti_f8_set(-HUGE_VALF);
     float right[PTI_SHORT];
     pti_f8 joined = none;
-    pti_lanes box;          /* for numbers; what is joined stays in lanes                                  */
+    pti_lanes box;          /* joined once more, in memory, where single lanes are read                    */
     uint32_t n = 0;
     int i;
     for (i = count - 1; i > 0; i--) {
@@ -5071,13 +5071,13 @@ PTI_INLINE void pti_put_in_bin(pti_wide_bins *bins, float place, const pti_lanes
     bins->count[i]++;
 }
 
-/* Twice the centre of a box, scaled. */
+/* Twice the centre of a box, from `from` on, scaled: lanes 4 to 6. */
 PTI_INLINE pti_f8 pti_box_place(const pti_lanes *box, const pti_lanes *from, const pti_lanes *scale)
 {
     return pti_f8_mul(pti_f8_sub(pti_f8_sub(box->f, pti_f8_swap(box->f)), from->f), scale->f);
 }
 
-/* Of each axis. */
+/* Puts a box into its bin of each axis. */
 PTI_INLINE void pti_put_in_bins(pti_wide_bins *bins, const pti_lanes *box, const pti_lanes *from, const pti_lanes *scale)
 {
     pti_lanes place;
@@ -5087,12 +5087,11 @@ PTI_INLINE void pti_put_in_bins(pti_wide_bins *bins, const pti_lanes *box, const
     pti_put_in_bin(&bins[2], place.v[6], box);
 }
 
-/* A box that falls where the last one fell waits for it; so every second box goes to bins of its own, which are joined in the
-   end, unless there are few. Of a very long list a fourth tells where to part it as well as all. */
-static void pti_fill_bins(const pti_lanes *boxes, uint32_t n, const pti_lanes *from, const pti_lanes *scale, pti_wide_bins *bins)
+/* Every box, or every step-th. If two in a row fall into one bin, the second waits until the first is stored: so, unless there are
+   few, every second one goes to a second set of bins, and the sets are joined in the end. */
+static void pti_fill_bins(const pti_lanes *boxes, uint32_t n, uint32_t step, const pti_lanes *from, const pti_lanes *scale, pti_wide_bins *bins)
 {
     pti_wide_bins more[3], *odd = n < 64 ? bins : more;
-    const uint32_t step = n < PTI_LONG ? 1 : 4;
     uint32_t i;
     int k, j;
     for (k = 0; k < 3; k++)
@@ -5118,8 +5117,9 @@ typedef union pti_keys {
     uint32_t bits[PTI_SHORT];
 } pti_keys;
 
-/* Each box of a short list has a bin of its own: its rank is the number of lesser keys. Keys lie from 1 to 2 and end in the
-   number of the box, so that no two are equal, nor lost where processors take what is very small for zero. */
+/* Each box of a short list has a bin of its own, numbered by its rank: how many keys are less. A key is 1 + place, its last five
+   bits replaced by the number of the box: so no two are equal, centres closer than 2^-18 of the extent stay in the order of the
+   list, and no key is so small that a processor might take it for zero. */
 static void pti_sort_bins(const pti_lanes *boxes, uint32_t n, const pti_lanes *from, const pti_lanes *scale, pti_wide_bins *bins)
 {
     const pti_f8 one = pti_f8_set(1), zero = pti_f8_set(0);
@@ -5146,11 +5146,21 @@ static void pti_sort_bins(const pti_lanes *boxes, uint32_t n, const pti_lanes *f
         }
 }
 
-/* Improves on *best, a halving of infinite cost, if the centres differ. A short list is left in the order of the best axis, for
-   the first of it to go left. */
+/* The best plane of each axis along which centres differ. */
+static void pti_sweep_axes(const pti_wide_bins *bins, int count, uint32_t few, const pti_parting *p, pti_parting *best)
+{
+    int k;
+    for (k = 0; k < 3; k++)
+        if (p[k].scale > 0) pti_sweep_blocks(&bins[k], count, few, p[k], best);
+}
+
+/* Improves on *best, which comes as a halving of infinite cost, if the centres differ. A short list is put in the order of the best
+   axis, and *best says how many of the first go left. Of a very long one a sample tells where to part it, unless all of that
+   falls into one bin. */
 static void pti_find_parting(const pti_wide_builder *b, uint32_t begin, uint32_t end, const float *centres, uint32_t few, pti_parting *best)
 {
     const uint32_t n = end - begin;
+    const uint32_t step = n < PTI_LONG ? 1 : 5;
     const int sort = n <= PTI_SHORT, count = sort ? (int)n : PTI_WIDE_BINS;
     pti_wide_bins bins[3];
     pti_parting p[3];
@@ -5163,14 +5173,17 @@ static void pti_find_parting(const pti_wide_builder *b, uint32_t begin, uint32_t
         p[k] = *best;
         p[k].axis = k;
         p[k].lo = -centres[k];
-        p[k].scale = extent > 1e-30f ? (sort ? 1 : (float)count) * (1 - 4 * PTI_U) / extent : 0; /* all fall below the last */
+        p[k].scale = extent > 1e-30f ? (sort ? 1 : (float)count) * (1 - 4 * PTI_U) / extent : 0; /* place < count */
         from.v[4 + k] = p[k].lo;
         scale.v[4 + k] = p[k].scale;
     }
     if (sort) pti_sort_bins(b->boxes + begin, n, &from, &scale, bins);
-    else pti_fill_bins(b->boxes + begin, n, &from, &scale, bins);
-    for (k = 0; k < 3; k++)
-        if (p[k].scale > 0) pti_sweep_blocks(&bins[k], count, few, p[k], best);
+    else pti_fill_bins(b->boxes + begin, n, step, &from, &scale, bins);
+    pti_sweep_axes(bins, count, few, p, best);
+    if (step > 1 && best->axis < 0) {
+        pti_fill_bins(b->boxes + begin, n, 1, &from, &scale, bins);
+        pti_sweep_axes(bins, count, few, p, best);
+    }
     if (!sort || best->axis < 0) return;
     memcpy(b->boxes + begin, bins[best->axis].box, n * sizeof *b->boxes);
     best->axis = -1;
@@ -5203,7 +5216,7 @@ static uint32_t pti_part(pti_wide_builder *b, uint32_t begin, uint32_t end, cons
     }
     for (i = begin; i < end; i++) {
         const pti_lanes box = b->boxes[i];
-        const float place = (box.v[4 + k] - box.v[k] - p->lo) * p->scale;
+        const float from = box.v[4 + k] - box.v[k], along = from - p->lo, place = along * p->scale; /* each rounded, as lanes are */
         const pti_m8 goes_left = pti_f8_lt(pti_f8_set(place), plane);
         const pti_f8 centre = pti_f8_sub(box.f, pti_f8_swap(box.f));
         left_box = pti_f8_max(left_box, pti_f8_select(goes_left, box.f, none));
@@ -5243,9 +5256,11 @@ static void pti_collapse(const pti_wide_builder *b, pti_binary *n)
 }
 
 /* Node n, whose range is known, and all below it. pieces: what is small is left for later. First walls are parted from the
-   rest, and then flat primitives from spheres. Below the top n boxes make one leaf, or n / 4 at most: four and more are on
-   each side of a plane, and of the middle of a long list, and what is halved to the end makes ceil(n / 8). So lists of n boxes
-   in all make up to 256 + n / 2 nodes there, and 255 are above. */
+   rest, and then flat primitives from spheres.
+
+   How many nodes? Depths 0 to 7 have 255 at most, depth 8 has 256. From there on n boxes make one leaf, or n / 4 at most: a plane
+   leaves four or more on each side, and so does the halving of more than PTI_SHORT; fewer are halved only where all centres are
+   one or the tree is too deep, thus to the end, into ceil(n / 8) leaves. L leaves are 2 L - 1 nodes: 256 + lanes / 2 in all. */
 static void pti_build_binary(pti_wide_builder *b, uint32_t n, const pti_joined *all, int depth, int pieces)
 {
     pti_binary *node = &b->nodes[n];
@@ -5483,11 +5498,12 @@ static void pti_write_things(pti_wide_builder *b, pt_wide *wide)
 static int pti_build_wide_tree(const pt_scene *scene, pt_wide *wide, uint32_t triangles, uint32_t halves)
 {
     const uint32_t lanes = scene->primitive_count + halves / 2, nodes = lanes / 2 + 512;
-    void *user = scene->alloc_user, *memory;
+    const size_t places = (size_t)lanes + 2 * (size_t)nodes; /* a node has the size of two boxes */
+    void *user = scene->alloc_user, *memory = NULL;
     pti_wide_builder b;
     int ok;
     memset(&b, 0, sizeof b);
-    b.nodes = (pti_binary *)pti_alloc_lines(((size_t)lanes + 2 * (size_t)nodes) * sizeof(pti_lanes), &memory, user);
+    b.nodes = places > SIZE_MAX / sizeof(pti_lanes) ? NULL : (pti_binary *)pti_alloc_lines(places * sizeof(pti_lanes), &memory, user);
     ok = b.nodes != NULL;
     if (ok) {
         b.scene = scene;

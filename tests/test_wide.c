@@ -690,6 +690,7 @@ static const char *part_list(uint32_t n, int kind, uint32_t few, pt_pcg32 *rng)
     b.boxes = moved;
     p.middle = (n / 2 + 7) / 8 * 8;
     pti_find_parting(&b, 0, n, all.centres.v, few, &p);
+    if (n <= 8 && p.cost == HUGE_VALF) return best == HUGE_VALF ? NULL : "no cut"; /* a leaf stays whole */
     middle = pti_part(&b, 0, n, &p, side);
     if (middle < 1 || middle >= n) return "a side is empty";
     for (i = 0; i < n; i++) who[i] = moved[i].bits[3];
@@ -708,6 +709,39 @@ static const char *part_list(uint32_t n, int kind, uint32_t few, pt_pcg32 *rng)
     return fabsf(p.cost - cost) > 1e-6f * best ? "its cost" : NULL;
 }
 
+/* A very long list; every period-th box has its centre at one point, as scenes that are written in turns may have. 0: none. */
+static const char *part_long_list(uint32_t period, pt_pcg32 *rng)
+{
+    static pti_lanes boxes[PTI_LONG + 7];
+    static pti_wide_builder b;
+    const uint32_t n = PTI_LONG + 7;
+    pti_parting p = {-1, 0, 0, 0, HUGE_VALF, 0};
+    pti_joined all, side[2];
+    uint32_t i, middle;
+    fill_list(boxes, n, 0, rng);
+    for (i = 0; i < n; i++) {
+        if (period > 0 && i % period == 0) fill_list(&boxes[i], 1, 2, rng);
+        boxes[i].bits[3] = i;
+    }
+    pti_join(boxes, n, &all);
+    b.boxes = boxes;
+    p.middle = (n / 2 + 7) / 8 * 8;
+    pti_find_parting(&b, 0, n, all.centres.v, 4, &p);
+    if (p.axis < 0) return "no plane";
+    middle = pti_part(&b, 0, n, &p, side);
+    return middle < 4 || n - middle < 4 ? "too few on a side" : NULL;
+}
+
+static void long_partings(void)
+{
+    pt_pcg32 rng = pt_pcg32_make(pt_test_seed(72), 1);
+    uint32_t period;
+    for (period = 0; period < 9; period += period ? 1 : 2) {
+        const char *wrong = part_long_list(period, &rng);
+        pt_check(!wrong, label("a very long list, period %u", period), "%s", wrong ? wrong : "");
+    }
+}
+
 static void partings(void)
 {
     static const char *const CENTRES[3] = {"anywhere", "in a plane", "at one point"};
@@ -718,7 +752,7 @@ static void partings(void)
         for (k = 0; k < 2; k++) {
             const uint32_t few = k ? 4 : 1;
             const char *wrong = NULL;
-            for (n = 9; n <= 256 && !wrong; n += n < 40 ? 1 : 13) {
+            for (n = 1; n <= 256 && !wrong; n += n < 40 ? 1 : 13) {
                 int times;
                 for (times = 0; times < 20 && !wrong; times++) wrong = part_list(n, kind, few, &rng);
             }
@@ -794,7 +828,7 @@ static void structure(void)
 {
     int kind, n;
     for (kind = 0; kind < KINDS; kind++)
-        for (n = 100; n <= (kind == BALL ? 120000 : 30000); n *= n < 20000 ? 17 : 4) { /* of more than PTI_LONG a fourth is binned */
+        for (n = 100; n <= (kind == BALL ? 120000 : 30000); n *= n < 20000 ? 17 : 4) { /* the last is longer than PTI_LONG */
             pt_scene s;
             census c = {NULL, 0, 0, 0, 0};
             uint32_t i;
@@ -909,6 +943,7 @@ static int wide(int argc, char **argv)
     PT_TEST_EXACT(bounds_of_triangles);
     PT_TEST_EXACT(bounds_of_planes);
     PT_TEST_EXACT(partings);
+    PT_TEST_EXACT(long_partings);
     PT_TEST_EXACT(structure);
     PT_TEST_EXACT(any_threads);
     PT_TEST_EXACT(bad_luck);
