@@ -1,4 +1,4 @@
-/* pathtracer.h - v0.6.2 - a path tracer in one C99 header: render by the rendering equation,
+/* pathtracer.h - v0.6.3 - a path tracer in one C99 header: render by the rendering equation,
    know how wrong the picture still is, and how long that took.      MIT-0 or public domain, see the end.
 
    Do this in exactly ONE C or C++ file, and include the header plainly everywhere else:
@@ -200,8 +200,8 @@
 
 #define PT_VERSION_MAJOR 0
 #define PT_VERSION_MINOR 6
-#define PT_VERSION_PATCH 2
-#define PT_VERSION_STRING "0.6.2"
+#define PT_VERSION_PATCH 3
+#define PT_VERSION_STRING "0.6.3"
 
 #if (defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ > 0) || \
      defined(__ASSOCIATIVE_MATH__) || defined(__RECIPROCAL_MATH__) || defined(_M_FP_FAST)) && \
@@ -1543,7 +1543,8 @@ typedef struct pt_li_options {
     pt_roulette roulette;
     pt_real roulette_survival;  /* PT_ROULETTE_CONSTANT: in (0, 1); 0 = 0.8                                */
     pt_real roulette_scale;     /* PT_ROULETTE_THROUGHPUT: > 1 lets paths live longer, which pays where edges are cheap
-                                   and their numbers well spread; 0 = 1, in lockstep 4                     */
+                                   and their numbers well spread; 0 = 4 in lockstep where lanes ask for all
+                                   primitives or for walls, else 1                                         */
     int roulette_start;         /* edges before the first roulette, >= 1; 0 = 1 if constant, else 3        */
     pt_heuristic heuristic;     /* of multiple importance sampling                                         */
 #if PTI_HAS_WHITTED
@@ -5740,23 +5741,31 @@ PTI_INLINE unsigned pti_triangle_lanes(const pti_triangle8 *p, const pti_ray *r,
 /* Where do eight spheres begin? PTI_NEVER for those that cannot be hit; no later than the hit for the others.
 
    The foot of the perpendicular from the centre is l = f + b d with f = o - c and b = -f.d / d.d. f is off by 2 u S a
-   coordinate and b |d| by 31 u S, along the ray; so |l| is off by at most 47 u S, and with the radius r + 64 u S both the
-   question and the half chord are on the safe side; 48 u S more cover b. */
+   coordinate and b |d| by 31 u S, along the ray; so |l| is off by at most 47 u S, and with the radius r + 64 u S the question
+   and the half chord are on one safe side, with r - 64 u S on the other; 48 u S more cover b. Where the longest half chord ends
+   before the origin, all of the sphere is behind; where even the shortest begins before it, the origin is inside, and what is
+   hit is the end: in a room of huge spheres that puts the walls in their order. */
 PTI_INLINE8 pti_f8 pti_sphere_lanes(const pti_sphere8 *p, const pti_ray8 *w)
 {
     const pti_f8 dx = pti_f8_set(w->d[0]), dy = pti_f8_set(w->d[1]), dz = pti_f8_set(w->d[2]), zero = pti_f8_set(0);
     const pti_f8 fx = pti_f8_sub(pti_f8_set(w->o[0]), pti_f8_load(p->centre[0]));
     const pti_f8 fy = pti_f8_sub(pti_f8_set(w->o[1]), pti_f8_load(p->centre[1]));
     const pti_f8 fz = pti_f8_sub(pti_f8_set(w->o[2]), pti_f8_load(p->centre[2]));
-    const float square = w->d[0] * w->d[0] + w->d[1] * w->d[1] + w->d[2] * w->d[2], u = PTI_U * w->span;
+    const float square = w->d[0] * w->d[0] + w->d[1] * w->d[1] + w->d[2] * w->d[2], u = PTI_U * w->span, per = 1 / sqrtf(square);
     const pti_f8 b = pti_f8_mul(pti_f8_madd(fx, dx, pti_f8_madd(fy, dy, pti_f8_mul(fz, dz))), pti_f8_set(-1 / square));
     const pti_f8 lx = pti_f8_madd(b, dx, fx), ly = pti_f8_madd(b, dy, fy), lz = pti_f8_madd(b, dz, fz);
-    const pti_f8 r = pti_f8_add(pti_f8_load(p->radius), pti_f8_set(64 * u));
-    const pti_f8 left = pti_f8_nmadd(lx, lx, pti_f8_nmadd(ly, ly, pti_f8_nmadd(lz, lz, pti_f8_mul(r, r))));
-    const pti_f8 chord = pti_f8_add(pti_f8_sqrt(pti_f8_max(left, zero)), pti_f8_set(48 * u));
-    const pti_f8 half = pti_f8_mul(chord, pti_f8_set((1 + 8 * PTI_U) / sqrtf(square)));
+    const pti_f8 r = pti_f8_load(p->radius), most = pti_f8_add(r, pti_f8_set(64 * u)), l2 = pti_f8_madd(lx, lx, pti_f8_madd(ly, ly, pti_f8_mul(lz, lz)));
+    const pti_f8 left = pti_f8_sub(pti_f8_mul(most, most), l2), longest = pti_f8_add(pti_f8_sqrt(pti_f8_max(left, zero)), pti_f8_set(48 * u));
+    const pti_f8 half = pti_f8_mul(longest, pti_f8_set((1 + 8 * PTI_U) * per));
     const pti_f8 seen = pti_f8_select(pti_f8_lt(left, zero), left, pti_f8_add(b, half)); /* < 0: missed, or behind */
-    return pti_f8_select(pti_f8_lt(seen, zero), pti_f8_set(PTI_NEVER), pti_f8_max(pti_f8_sub(b, half), pti_f8_set(PTI_SOON)));
+    pti_f8 start = pti_f8_sub(b, half);
+    if (pti_m8_bits(pti_f8_lt(start, zero)) & pti_m8_bits(pti_f8_le(zero, seen))) { /* perhaps inside */
+        const pti_f8 least = pti_f8_max(pti_f8_sub(r, pti_f8_set(64 * u)), zero), sure = pti_f8_sub(pti_f8_mul(least, least), l2);
+        const pti_f8 shortest = pti_f8_sub(pti_f8_sqrt(pti_f8_max(sure, zero)), pti_f8_set(48 * u));
+        const pti_f8 inner = pti_f8_mul(shortest, pti_f8_set((1 - 8 * PTI_U) * per));
+        start = pti_f8_select(pti_f8_lt(b, inner), pti_f8_add(b, inner), start);
+    }
+    return pti_f8_select(pti_f8_lt(seen, zero), pti_f8_set(PTI_NEVER), pti_f8_max(start, pti_f8_set(PTI_SOON)));
 }
 
 /* A child that waits: its reference, and above it the bits of where its box begins, in the order of floats >= 0. */
@@ -11208,12 +11217,13 @@ PTI_INLINE8 pti_w3 pti_lock_scatter(const pti_lockstep *k, pti_lock_surface *s, 
     return next;
 }
 
-/* Russian roulette, as pti_roulette; the lanes that go on. */
-PTI_INLINE8 pti_mw pti_lock_roulette(const pt_li_options *options, pti_lane_row *row, pti_w3 *beta, pti_fw u)
+/* Russian roulette, as pti_roulette; the lanes that go on. Edges are cheap where rays go through the scene in lanes. */
+PTI_INLINE8 pti_mw pti_lock_roulette(const pti_lockstep *k, const pt_li_options *options, pti_lane_row *row, pti_w3 *beta, pti_fw u)
 {
     const int constant = options->roulette == PT_ROULETTE_CONSTANT;
     const int start = options->roulette_start > 0 ? options->roulette_start : constant ? 1 : 3;
-    const pti_fw scale = pti_fw_set(options->roulette_scale > 0 ? (float)options->roulette_scale : 4);
+    const float cheap = k->tree && k->walls == 0 ? 1 : 4;
+    const pti_fw scale = pti_fw_set(options->roulette_scale > 0 ? (float)options->roulette_scale : cheap);
     pti_fw q = pti_fw_mul(pti_fw_mul(scale, pti_fw_max(beta->x, pti_fw_max(beta->y, beta->z))), row[PTI_ROW_ETA2].f);
     const pti_mw due = pti_fw_le(pti_fw_set((float)start), pti_fw_from_words(row[PTI_ROW_EDGES].u));
     if (constant) q = pti_fw_set(options->roulette_survival > 0 ? (float)options->roulette_survival : 0.8f);
@@ -11287,7 +11297,7 @@ static unsigned pti_lock_vertex(pti_lock_work *w, pti_lane_row *row, unsigned ac
     next = pti_lock_scatter(k, &s, facets, d, u, &weight, &density, row, &go);
     beta = pti_w3_mul(pti_row3(row + PTI_ROW_BETA), weight);
     go = pti_mw_and(go, pti_fw_lt(zero, pti_fw_max(beta.x, pti_fw_max(beta.y, beta.z))));
-    if (options->roulette != PT_ROULETTE_NONE) go = pti_mw_and(go, pti_lock_roulette(options, row, &beta, u_roulette));
+    if (options->roulette != PT_ROULETTE_NONE) go = pti_mw_and(go, pti_lock_roulette(k, options, row, &beta, u_roulette));
     pti_row3_set(row + PTI_ROW_BETA, beta);
     pti_row3_set(row + PTI_ROW_D, next);
     next = pti_w3_along(s.ng, pti_lock_lift(k, &s, next), s.p);
@@ -15365,6 +15375,8 @@ PTDEF const pt_scene_entry *pt_scene_find(const char *name)
 /*
    VERSION HISTORY
 
+   0.6.3 (2026-11-23)  spheres seen from inside are tried in the order of their far walls, and lockstep without lanes of walls
+                       ends paths as early as one path at a time does: smallpt's box in 0.45 of the time.
    0.6.2 (2026-11-23)  the wide tree sorts short lists instead of binning them: 3 to 15 % less memory, rays of a room in 0.85
                        to 0.95 of the time; it is built in 0.85 to 0.9 of the time with AVX2, 0.6 with SSE2.
    0.6.1 (2026-11-23)  the wide tree computes what a ray hits in double once, when nothing nearer is left, and shadow rays

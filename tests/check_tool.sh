@@ -511,6 +511,11 @@ quiet cornell --size 20x20 --spp 4 --progress off --eye 278,273,-800 --look-at 2
     quiet cornell --size 20x20 --spp 4 --progress off --fov 20 --film narrow.film && quiet --compare narrow.film lens.film
 awk -v d="$(compared RMSE)" 'BEGIN { exit !(d > 0.01) }'
 check $? 'the camera of a canonical scene can be moved'
+for subject in glass-ball cube.obj; do
+    quiet $subject --size 20x20 --spp 4 --progress off --eye 3,4,5 --film leaning.film &&
+        quiet $subject --size 20x20 --spp 4 --progress off --eye 3,4,5 --up 0,1,0 --film upright.film
+    same_files "$subject: a moved camera stands upright" leaning.film upright.film
+done
 # The lamp is left above the eye: a wall that faces left is brighter than one that faces right, and so is the upper side
 # of a roof than its lower one.
 for side in '-1 0' '1 0' '0 1' '0 -1'; do # x and y of a normal whose z is 1

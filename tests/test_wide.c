@@ -138,10 +138,11 @@ static void lanes_together(void)
 
 /* ---- scenes ------------------------------------------------------------------------------------------------ */
 
-enum { TRIANGLES, QUADS, PARALLELOGRAMS, SPHERES, MIXED, BALL, SOUP, SLIVERS, FLAT, IDENTICAL, LAYERS, GIANT, CHAIN, ROOM, FURNISHED, KINDS };
-static const char *const NAMES[KINDS] = {"triangles", "quads",   "parallelograms", "spheres",   "all shapes",
-                                         "a ball",    "a soup",  "slivers",        "coplanar",  "identical",
-                                         "layers",    "a giant among dwarfs", "a chain of 2^-i", "a room",      "a room with a ball"};
+enum { TRIANGLES, QUADS, PARALLELOGRAMS, SPHERES, HOLLOW, MIXED, BALL, SOUP, SLIVERS, FLAT, IDENTICAL, LAYERS, GIANT, CHAIN, ROOM, FURNISHED, KINDS };
+static const char *const NAMES[KINDS] = {"triangles", "quads",   "parallelograms", "spheres",   "spheres around",
+                                         "all shapes", "a ball", "a soup",         "slivers",   "coplanar",
+                                         "identical", "layers",  "a giant among dwarfs", "a chain of 2^-i", "a room",
+                                         "a room with a ball"};
 
 static void add_ball(pt_scene *s, int rings, pt_vec3 c, double r, int m)
 {
@@ -170,13 +171,17 @@ static void add_thing(pt_scene *s, int kind, int k, pt_vec3 at, double scale, pt
 {
     const pt_vec3 a = pt_v3_add(at, in_cube(rng, scale)), b = in_cube(rng, 0.4 * scale), c = in_cube(rng, 0.4 * scale);
     const pt_vec3 e = pt_v3_add(a, b), f = pt_v3_add(a, c);
-    const double size = between(rng, 0.01, 0.4) * scale, step = ldexp(scale, -(k % 100)), layer = ldexp(k * 7 % 9 * scale, -23);
+    const double size = between(rng, 0.01, 0.4) * scale, around = pow(10, k % 6) * scale, step = ldexp(scale, -(k % 100)), layer = ldexp(k * 7 % 9 * scale, -23);
     switch (kind == MIXED ? k % 4 : kind) {
     case TRIANGLES:
     case SOUP: pt_add_triangle(s, a, e, f, m); break;
     case QUADS: pt_add_quad(s, a, e, pt_v3_add(e, c), f, m); break;
     case PARALLELOGRAMS: pt_add_parallelogram(s, a, b, c, m); break;
     case SPHERES: pt_add_sphere(s, a, (pt_real)size, m); break;
+    case HOLLOW: /* walls seen from inside, in groups so near each other that rounding in float decides which is nearer */
+        pt_add_sphere(s, pt_v3_add(at, pt_v3_scale(pt_v3_normalize(v3(k / 6 % 3 - 1, k / 18 % 3 - 1, k / 6 % 2 - 0.5)), (pt_real)(2 * around - scale - layer))),
+                      (pt_real)(2 * around), m);
+        break;
     case SLIVERS: pt_add_triangle(s, a, e, pt_v3_add(pt_v3_add(a, pt_v3_scale(b, (pt_real)0.5)), pt_v3_scale(c, (pt_real)pow(10, -(k % 12)))), m); break;
     case FLAT: pt_add_triangle(s, pt_v3(a.x, a.y, at.z), pt_v3(e.x, e.y, at.z), pt_v3(f.x, f.y, at.z), m); break;
     case IDENTICAL:

@@ -133,9 +133,9 @@ static pt_camera frame_model(const tool *t, const extent *e)
     return pt_camera_look_at(along(e->centre, 1.05 * framing_distance(e, &axes, aspect), way), e->centre, e->up, fov);
 }
 
-/* What --eye, --look-at, --up, --fov, --aperture and --focus change about a camera. `target` is what it looks at. 0: the
-   view is not possible. */
-static int adjust_camera(const tool *t, pt_vec3 target, pt_camera *c)
+/* What --eye, --look-at, --up, --fov, --aperture and --focus change about a camera. `target` is what it looks at, `up` is up
+   for all that is seen: the camera's own axis leans with its view. 0: the view is not possible. */
+static int adjust_camera(const tool *t, pt_vec3 target, pt_vec3 up, pt_camera *c)
 {
     const double fov = t->fov > 0 ? t->fov : 2 * atan((double)c->tan_half) * 180 / PT_PI;
     pt_camera was = *c;
@@ -143,7 +143,7 @@ static int adjust_camera(const tool *t, pt_vec3 target, pt_camera *c)
     if (t->look_at.given) target = vec3_of(&t->look_at);
     if (t->eye.given || t->look_at.given || t->up.given) {
         *c = pt_camera_look_at(t->eye.given ? vec3_of(&t->eye) : was.position, target,
-                               t->up.given ? vec3_of(&t->up) : was.up, (pt_real)fov);
+                               t->up.given ? vec3_of(&t->up) : up, (pt_real)fov);
         c->lens_radius = was.lens_radius;
         c->focus_distance = was.focus_distance;
         c->near_distance = was.near_distance;
@@ -276,7 +276,7 @@ static int make_model(tool *t, pt_scene *scene)
     if (t->verbose) tell_contents(t, &info);
     if (!measure(t, &info, &e)) return 0;
     t->desc.camera = frame_model(t, &e);
-    if (!adjust_camera(t, e.centre, &t->desc.camera)) return 0;
+    if (!adjust_camera(t, e.centre, e.up, &t->desc.camera)) return 0;
     if (t->floor) add_floor(scene, &e);
     return light_model(t, scene, lamp_direction(&e, &t->desc.camera), info.emissive_triangles > 0) && commit_subject(t, scene);
 }
@@ -290,7 +290,7 @@ static int make_canonical(tool *t, pt_scene *scene)
 
     if (result != PT_OK) return subject_error(t, result == PT_ERROR_SCENE ? pt_scene_error(scene) : pt_result_string(result));
     ray = pt_camera_ray(c, 1, (pt_real)0.5, (pt_real)0.5, pt_v2(0, 0)); /* what it looks at */
-    return adjust_camera(t, pt_intersect(scene, &ray, &hit) ? hit.p : pt_v3_add(c->position, c->forward), c);
+    return adjust_camera(t, pt_intersect(scene, &ray, &hit) ? hit.p : pt_v3_add(c->position, c->forward), pt_v3(0, 1, 0), c);
 }
 
 /* What the scene holds (--verbose), and what the method will not show of it. */
