@@ -1,4 +1,4 @@
-/* pathtracer.h - v0.6.3 - a path tracer in one C99 header: render by the rendering equation,
+/* pathtracer.h - v0.6.4 - a path tracer in one C99 header: render by the rendering equation,
    know how wrong the picture still is, and how long that took.      MIT-0 or public domain, see the end.
 
    Do this in exactly ONE C or C++ file, and include the header plainly everywhere else:
@@ -177,6 +177,7 @@
        [Sch94] Schlick: An Inexpensive BRDF Model for Physically-based Rendering, 1994
        [Shi97] Shirley, Chiu: A Low Distortion Map Between Disk and Square, 1997
        [Sny96] Snyder: Area Light Sources for Real-Time Graphics, 1996
+       [Spe62] Spencer, Murty: General Ray-Tracing Procedure, J. Optical Society 52(6), 1962
        [Ste11] Stafford: Better Bit Mixing, 2011 (finaliser used by Java's SplittableRandom)
        [Ure13] Urena, Fajardo, King: An Area-Preserving Parametrization for Spherical Rectangles, 2013
        [Vea97] Veach: Robust Monte Carlo Methods for Light Transport Simulation, 1997
@@ -200,8 +201,8 @@
 
 #define PT_VERSION_MAJOR 0
 #define PT_VERSION_MINOR 6
-#define PT_VERSION_PATCH 3
-#define PT_VERSION_STRING "0.6.3"
+#define PT_VERSION_PATCH 4
+#define PT_VERSION_STRING "0.6.4"
 
 #if (defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ > 0) || \
      defined(__ASSOCIATIVE_MATH__) || defined(__RECIPROCAL_MATH__) || defined(_M_FP_FAST)) && \
@@ -9687,7 +9688,13 @@ PTDEF pt_rgbd pt_li_branching(const pt_scene *scene, const pt_ray *ray, pt_sampl
 
    A shadow ray starts and ends on surfaces. A plane that has all surfaces on one side cannot come between two points
    of them: the walls of a room are not asked. Parallelograms whose edges follow two axes are tested by three
-   multiplications and four comparisons. */
+   multiplications and four comparisons.
+
+   Walls that are huge spheres ("shells") are asked by their height at a point, which needs neither centre nor radius, if the
+   scene is of spheres, the camera has no lens, and shells that no light shines from and none sees through are around the
+   start of its rays. Where walls meet they have no edges to keep from: all are unbounded, and the first is the one. A ray from
+   inside is behind a shell where its end is. Rows of the picture whose rays may start outside are left to pti_path. The boxes
+   of the spheres must bound the room, so rooms that are turned against the axes ask their tree. */
 
 #if PTI_HAS_LOCKSTEP
 
@@ -9948,7 +9955,7 @@ PTI_INLINE8 void pti_fw_sincos(pti_fw x, pti_fw *s, pti_fw *c)
 
 /* --- the scene, made ready --- */
 
-enum { PTI_LOCK_MAX = 64, PTI_LOCK_CLASSES = 6, PTI_LOCK_QUADS = 3, PTI_LOCK_TRIANGLES = 4, PTI_LOCK_SPHERES = 5 };
+enum { PTI_LOCK_MAX = 64, PTI_LOCK_CLASSES = 7, PTI_LOCK_QUADS = 3, PTI_LOCK_TRIANGLES = 4, PTI_LOCK_SPHERES = 5, PTI_LOCK_SHELLS = 6 };
 
 /* What a lane looks up of the primitive it has hit, and of the light it has chosen. */
 enum {
@@ -9956,7 +9963,8 @@ enum {
     PTI_OF_CENTRE = 4, PTI_OF_DEPTH = 7, /* centroid and its distance to the nearest edge; centre of a sphere */
     PTI_OF_RADIUS = 8,              /* 0: flat */
     PTI_OF_ALBEDO = 9, PTI_OF_KIND = 12, PTI_OF_IOR = 13, PTI_OF_LIGHT = 14,
-    PTI_OF_ALPHA = 15, PTI_OF_ETA = 16, PTI_OF_K = 19, PTI_OF_COUNT = 22 /* of metal; alpha 0: smooth       */
+    PTI_OF_ALPHA = 15, PTI_OF_ETA = 16, PTI_OF_K = 19, /* of metal; alpha 0: smooth                         */
+    PTI_OF_TANGENT = 22, PTI_OF_HEIGHT = 25, PTI_OF_BEND = 26, PTI_OF_COUNT = 27 /* of shells, as in `at`; centre: foot */
 };
 enum {
     PTI_LIT_P, PTI_LIT_E1 = 3, PTI_LIT_E2 = 6, PTI_LIT_N = 9, /* corner, edges, normal; centre of a sphere   */
@@ -9965,12 +9973,13 @@ enum {
 };
 
 typedef struct pti_lockstep {
-    /* classes 0, 1, 2: rectangles across x, y, z; parallelograms; triangles; spheres. Those of class c stand from begin[c] on,
+    /* classes 0, 1, 2: rectangles across x, y, z; parallelograms; triangles; spheres; shells. Those of class c stand from begin[c] on,
        first those that can block a shadow ray, up to blockers[c] */
     int begin[PTI_LOCK_CLASSES + 1], blockers[PTI_LOCK_CLASSES];
     float at[PTI_LOCK_MAX][16];     /* rectangle: place, from, to along the next axis, and along the one after, side of ng. Others: rows
                                        x, y, z, 1 of the height above the plane and of the distances from edges: two, and
-                                       the distances of the opposite edges, or three. Sphere: centre, radius        */
+                                       the distances of the opposite edges, or three. Sphere: centre, radius. Shell: foot,
+                                       bend, tangent, height                                                         */
     float of[PTI_OF_COUNT][PTI_LOCK_MAX], light[PTI_LIT_COUNT][PTI_LOCK_MAX], chosen[PTI_LOCK_MAX];
     int light_count, sphere_lights, specular, metal, rough; /* specular: something is not diffuse; some metal; some rough one */
     int shading;                    /* some shading normals                                                */
@@ -10172,6 +10181,24 @@ static void pti_lock_write_material(pti_lockstep *k, const pt_material *m, int i
     k->rough |= !pti_is_smooth(m);
 }
 
+/* A shell is a sphere so large beside the room within that its centre and radius have no digits for that. With q = p - a from a
+   point a of it near the room, the foot, (|p - c|^2 - r^2) / 2 r is bend |q|^2 + tangent.q + height, with bend = 1 / 2 r and
+   tangent = (a - c) / r: all numbers of the size of the room, as for a plane, which has bend 0 [Spe62]. That is the height of p
+   above it, up to its square / 2 r; the tangent points out, and 1 / r there is the curvature. */
+static void pti_lock_write_shell(pti_lockstep *k, const pti_lock_item *q, int i)
+{
+    const double r = q->radius;
+    const pti_d3 foot = pti_d_from(q->c[1]), a = pti_d_sub(foot, pti_d_from(q->c[0])), tangent = pti_d_scale(a, 1 / r);
+    const double bend = 0.5 / r, height = (pti_d_length(a) - r) * (pti_d_length(a) + r) * bend;
+    const double row[8] = {foot.x, foot.y, foot.z, bend, tangent.x, tangent.y, tangent.z, height};
+    int j;
+    for (j = 0; j < 8; j++) k->at[i][j] = (float)row[j];
+    pti_lock_put(k->of, PTI_OF_CENTRE, i, foot);
+    pti_lock_put(k->of, PTI_OF_TANGENT, i, tangent);
+    k->of[PTI_OF_HEIGHT][i] = (float)height;
+    k->of[PTI_OF_BEND][i] = (float)bend;
+}
+
 /* Writes item q as number i, but for its light; returns its smallest measure: from the middle to an edge, across a ball. */
 static double pti_lock_write(pti_lockstep *k, const pt_scene *scene, const pti_lock_item *q, int i)
 {
@@ -10199,6 +10226,7 @@ static double pti_lock_write(pti_lockstep *k, const pt_scene *scene, const pti_l
     pti_lock_put(k->of, PTI_OF_CENTRE, i, pti_lock_middle(q));
     k->of[PTI_OF_DEPTH][i] = (float)depth;
     k->of[PTI_OF_RADIUS][i] = (float)q->radius;
+    if (q->kind == PTI_LOCK_SHELLS) pti_lock_write_shell(k, q, i);
     pti_lock_write_material(k, &scene->materials[q->material], i);
     k->of[PTI_OF_LIGHT][i] = (float)q->light;
     return q->corners ? depth : 2 * depth;
@@ -10385,24 +10413,120 @@ static int pti_lockstep_make_tree(pti_lockstep *k, const pt_scene *scene, pt_vec
     return 1;
 }
 
-/* Makes a small scene ready; 0: it is not one for lanes, or not seen from such a place. */
-static int pti_lockstep_make(pti_lockstep *k, const pt_scene *scene, pt_vec3 eye)
+/* Makes a small scene ready that is these items, seen from such places, with coordinates up to x; 0: it is not one for lanes. */
+static int pti_lockstep_make_items(pti_lockstep *k, const pt_scene *scene, pti_lock_item *items, int count, double x)
 {
-    const double x = pti_lock_extent(scene), from = fmax(x, pti_max3((double)eye.x, (double)eye.y, (double)eye.z));
-    pti_lock_item items[PTI_LOCK_MAX];
     double smallest, sum = 0;
-    uint32_t i;
-    int count = 0, j;
-    if (!pti_lock_knows(scene, 0) || scene->primitive_count > PTI_LOCK_MAX) return 0;
-    memset(k, 0, sizeof *k);
-    k->e = pti_lock_error(x);
-    k->e_camera = pti_lock_error(from);
-    for (i = 0; i < scene->primitive_count; count++) i += pti_lock_collect(scene, i, x, &items[count]);
+    int j;
     for (j = 0; j < count; j++)
         if (!pti_lock_takes(&scene->materials[items[j].material])) return 0;
     if (!pti_lock_relate(items, count, count, (double)k->e)) return 0;
     smallest = pti_lock_write_items(k, scene, items, count, &sum);
     return pti_lock_bright(k) && pti_lock_large(k, smallest) && smallest > 64 * (double)k->e_camera && x < 1e15;
+}
+
+/* Makes a small scene ready; 0: it is not one for lanes, or not seen from such a place. */
+static int pti_lockstep_make(pti_lockstep *k, const pt_scene *scene, pt_vec3 eye)
+{
+    const double x = pti_lock_extent(scene), from = fmax(x, pti_max3((double)eye.x, (double)eye.y, (double)eye.z));
+    pti_lock_item items[PTI_LOCK_MAX];
+    uint32_t i;
+    int count = 0;
+    if (!pti_lock_knows(scene, 0) || scene->primitive_count > PTI_LOCK_MAX) return 0;
+    memset(k, 0, sizeof *k);
+    k->e = pti_lock_error(x);
+    k->e_camera = pti_lock_error(from);
+    for (i = 0; i < scene->primitive_count; count++) i += pti_lock_collect(scene, i, x, &items[count]);
+    return pti_lockstep_make_items(k, scene, items, count, x);
+}
+
+/* Is a point, and what rounding makes of it, inside all shells? */
+static int pti_lock_inside(const pti_lockstep *k, pt_vec3 p)
+{
+    int i, j;
+    for (i = k->begin[PTI_LOCK_SHELLS]; i < k->begin[PTI_LOCK_CLASSES]; i++) {
+        const float *at = k->at[i], v[3] = {(float)p.x, (float)p.y, (float)p.z};
+        double height = (double)at[7];
+        for (j = 0; j < 3; j++) {
+            const double q = (double)v[j] - (double)at[j];
+            height += q * ((double)at[3] * q + (double)at[4 + j]);
+        }
+        if (!(height < -4 * (double)k->e)) return 0;
+    }
+    return 1;
+}
+
+/* Do two shells meet in the room, around `middle` with half its diagonal, at less than 8 degrees? They do so along a circle, and
+   everywhere at the same angle. */
+static int pti_lock_sharp(const pti_lock_item *a, const pti_lock_item *b, pti_d3 middle, double diagonal)
+{
+    const pti_d3 between = pti_d_between(a->c[0], b->c[0]), to = pti_d_sub(middle, pti_d_from(a->c[0]));
+    const double r = a->radius, d = pti_d_length(between), cosine = (r * r + b->radius * b->radius - d * d) / (2 * r * b->radius);
+    double at, ring, along, across;
+    if (!(fabs(cosine) < 1 && cosine < -0.99)) return 0; /* one in the other: the outer is never seen */
+    at = (d * d + r * r - b->radius * b->radius) / (2 * d);
+    ring = sqrt(fmax(0, (r - at) * (r + at)));
+    along = pti_d_dot(to, between) / d;
+    across = sqrt(fmax(0, pti_d_dot(to, to) - along * along));
+    return hypot(along - at, across - ring) < 1.01 * diagonal;
+}
+
+/* The box of the room that shells make: all is in it that a path from inside them can come to. */
+static void pti_lock_room(const pti_lock_item *items, int count, double lo[3], double hi[3])
+{
+    int j, i;
+    for (i = 0; i < 3; i++) {
+        lo[i] = -HUGE_VAL;
+        hi[i] = HUGE_VAL;
+    }
+    for (j = 0; j < count; j++)
+        for (i = 0; i < 3 && items[j].kind == PTI_LOCK_SHELLS; i++) {
+            lo[i] = fmax(lo[i], (double)pti_along(&items[j].c[0], i) - items[j].radius);
+            hi[i] = fmin(hi[i], (double)pti_along(&items[j].c[0], i) + items[j].radius);
+        }
+}
+
+/* Makes a scene of spheres ready some of which are shells: all those around `start`, where a ray of the camera starts. No path from
+   inside gets out of them, since they are not glass. A height has three times the roundings that it has above a plane: those
+   of q, of a square, and of one product more. */
+static int pti_lockstep_make_shells(pti_lockstep *k, const pt_scene *scene, pt_vec3 start)
+{
+    double lo[3], hi[3], x = 0, balls = 0, diagonal = 0;
+    pti_lock_item items[PTI_LOCK_MAX];
+    pti_d3 middle;
+    int count, i, j;
+    if (!pti_lock_knows(scene, 0) || scene->primitive_count > PTI_LOCK_MAX) return 0;
+    memset(k, 0, sizeof *k);
+    count = (int)scene->primitive_count;
+    for (j = 0; j < count; j++) {
+        pti_lock_item *q = &items[j];
+        pti_lock_single(scene, &scene->primitives[j], q);
+        q->from = q->to = j;
+        if (q->corners) return 0;
+        if (q->light < 0 && scene->materials[q->material].kind != PT_MATERIAL_DIELECTRIC && pti_d_length(pti_d_between(q->c[0], start)) < q->radius) q->kind = PTI_LOCK_SHELLS;
+        else balls = fmax(balls, q->radius + pti_max3(fabs((double)q->c[0].x), fabs((double)q->c[0].y), fabs((double)q->c[0].z)));
+    }
+    pti_lock_room(items, count, lo, hi);
+    for (i = 0; i < 3; i++) {
+        x = fmax(x, fmax(fabs(lo[i]), fabs(hi[i])));
+        diagonal = hypot(diagonal, (hi[i] - lo[i]) / 2);
+    }
+    if (!(x < 1e15)) return 0; /* no shells */
+    middle = pti_d((lo[0] + hi[0]) / 2, (lo[1] + hi[1]) / 2, (lo[2] + hi[2]) / 2);
+    for (j = 0; j < count; j++) {
+        pti_lock_item *q = &items[j];
+        const pti_d3 out = pti_d_sub(middle, pti_d_from(q->c[0])), centre = pti_d_from(q->c[0]);
+        if (q->kind != PTI_LOCK_SHELLS) continue;
+        if (!(pti_d_length(out) > 0)) return 0;
+        q->c[1] = pti_d_to(pti_d_add(centre, pti_d_scale(pti_d_normalize(out), q->radius)));
+        x = fmax(x, pti_max3(fabs((double)q->c[1].x), fabs((double)q->c[1].y), fabs((double)q->c[1].z)));
+        for (i = 0; i < j; i++)
+            if (items[i].kind == PTI_LOCK_SHELLS && pti_lock_sharp(q, &items[i], middle, diagonal)) return 0;
+    }
+    k->e = k->e_camera = pti_lock_error(fmax(3 * x, balls));
+    for (j = 0; j < count; j++)
+        if (items[j].kind == PTI_LOCK_SHELLS && !(items[j].radius < 1e14 * (double)k->e)) return 0; /* for the height, in double */
+    return pti_lockstep_make_items(k, scene, items, count, fmax(x, balls));
 }
 
 /* --- rays --- */
@@ -10488,7 +10612,7 @@ PTI_INLINE8 pti_mw pti_lock_balls(const pti_lockstep *k, pti_w3 o, pti_w3 d, pti
 {
     const pti_fw zero = pti_fw_set(0);
     int i;
-    for (i = k->begin[PTI_LOCK_SPHERES]; i < k->begin[PTI_LOCK_CLASSES]; i++) {
+    for (i = k->begin[PTI_LOCK_SPHERES]; i < k->begin[PTI_LOCK_SHELLS]; i++) {
         const pti_w3 f = pti_w3_sub(o, pti_w3_set(k->at[i]));
         const pti_fw r = pti_fw_set(k->at[i][3]), b = pti_fw_sub(zero, pti_w3_dot(f, d)), far = pti_fw_sqrt(pti_w3_dot(f, f));
         const pti_w3 foot = pti_w3_along(d, b, f);
@@ -10504,6 +10628,30 @@ PTI_INLINE8 pti_mw pti_lock_balls(const pti_lockstep *k, pti_w3 o, pti_w3 d, pti
     return met;
 }
 
+/* Along a ray from inside the height is height + t (b + bend t), and rises through 0 once. Rounding may have put the origin
+   outside, where walls meet: then a ray that leads out hits at once. What is above 0 at t lies behind the shell. */
+#define PTI_LOCK_SHELL 1e37f /* the margin of what has no edges, but is no ball */
+PTI_INLINE8 pti_mw pti_lock_shells(const pti_lockstep *k, pti_w3 o, pti_w3 d, pti_lock_best *best, pti_mw met, const int how)
+{
+    const pti_fw zero = pti_fw_set(0);
+    int i;
+    for (i = k->begin[PTI_LOCK_SHELLS]; i < k->begin[PTI_LOCK_CLASSES]; i++) {
+        const float *at = k->at[i];
+        const pti_w3 q = pti_w3_sub(o, pti_w3_set(at)), tangent = pti_w3_set(at + 4);
+        const pti_fw bend = pti_fw_set(at[3]), c = pti_fw_madd(bend, pti_w3_dot(q, q), pti_w3_dot_add(tangent, q, pti_fw_set(at[7])));
+        const pti_fw b = pti_fw_madd(pti_fw_add(bend, bend), pti_w3_dot(q, d), pti_w3_dot(tangent, d));
+        if (how == PTI_LOCK_ANY) {
+            met = pti_mw_or(met, pti_fw_lt(zero, pti_fw_madd(best->t, pti_fw_madd(bend, best->t, b), c)));
+        } else {
+            const pti_fw root = pti_fw_sqrt(pti_fw_max(pti_fw_nmadd(pti_fw_mul(pti_fw_set(4), bend), c, pti_fw_mul(b, b)), zero));
+            const pti_fw soon = pti_fw_max(pti_fw_div(pti_fw_mul(pti_fw_set(-2), c), pti_fw_add(b, root)), pti_fw_set(1e-30f));
+            const pti_fw late = pti_fw_div(pti_fw_sub(root, b), pti_fw_add(bend, bend));
+            pti_lock_keep(best, pti_fw_select(pti_fw_lt(zero, b), soon, late), pti_fw_set(PTI_LOCK_SHELL), zero, i, how);
+        }
+    }
+    return met;
+}
+
 /* All primitives against a ray in each lane, d of length 1. PTI_LOCK_ANY: those that can block. */
 PTI_INLINE8 pti_mw pti_lock_ask(const pti_lockstep *k, pti_w3 o, pti_w3 d, float e, pti_lock_best *best, const int how)
 {
@@ -10515,7 +10663,8 @@ PTI_INLINE8 pti_mw pti_lock_ask(const pti_lockstep *k, pti_w3 o, pti_w3 d, float
         met = pti_lock_rectangles(k, 2, pti_w3_make(o.z, o.x, o.y), pti_w3_make(d.z, d.x, d.y), e, best, met, how);
     met = pti_lock_flats(k, PTI_LOCK_QUADS, o, d, e, best, met, how);
     met = pti_lock_flats(k, PTI_LOCK_TRIANGLES, o, d, e, best, met, how);
-    return pti_lock_balls(k, o, d, best, met, how);
+    met = pti_lock_balls(k, o, d, best, met, how);
+    return pti_lock_shells(k, o, d, best, met, how);
 }
 
 /* Is there something before t that blocks? */
@@ -10660,6 +10809,15 @@ PTI_INLINE8 pti_w3 pti_lock_land(const pti_lockstep *k, pti_w3 o, pti_w3 d, cons
         const pti_w3 centre = pti_gather3(k->of, PTI_OF_CENTRE, s->i), out = pti_w3_normalize(pti_w3_sub(s->p, centre));
         n = pti_w3_select(s->ball, out, n);
         s->p = pti_w3_select(s->ball, pti_w3_along(out, pti_fw_gather(k->of[PTI_OF_RADIUS], s->i), centre), s->p);
+    }
+    if (k->begin[PTI_LOCK_SHELLS] < k->begin[PTI_LOCK_CLASSES]) {
+        const pti_mw shell = pti_mw_and(pti_fw_le(pti_fw_set(PTI_LOCK_SHELL), best->margin), pti_fw_lt(best->margin, pti_fw_set(1e38f)));
+        const pti_w3 p = pti_w3_along(d, best->t, o), q = pti_w3_sub(p, pti_gather3(k->of, PTI_OF_CENTRE, s->i));
+        const pti_w3 tangent = pti_gather3(k->of, PTI_OF_TANGENT, s->i);
+        const pti_fw bend = pti_fw_gather(k->of[PTI_OF_BEND], s->i), lift = pti_w3_dot_add(tangent, q, pti_fw_gather(k->of[PTI_OF_HEIGHT], s->i));
+        const pti_w3 out = pti_w3_normalize(pti_w3_along(q, pti_fw_add(bend, bend), tangent));
+        n = pti_w3_select(shell, out, n);
+        s->p = pti_w3_select(shell, pti_w3_along(out, pti_fw_sub(pti_fw_set(0), pti_fw_madd(bend, pti_w3_dot(q, q), lift)), p), s->p);
     }
     s->light = pti_fw_gather(k->of[PTI_OF_LIGHT], s->i);
     return n;
@@ -13824,6 +13982,36 @@ static pt_li_fn pti_pick_instance(const pt_method *method, const pt_scene *scene
 }
 
 #if PTI_HAS_LOCKSTEP
+/* Where the ray through a point of the picture, in pixels, starts, if the camera has no lens. */
+static pt_vec3 pti_camera_start(const pt_render_desc *d, double x, double y)
+{
+    const pt_camera *c = &d->camera;
+    const double wide = (double)c->tan_half / d->height, near = (double)c->near_distance;
+    const pti_d3 right = pti_d_scale(pti_d_from(c->right), (2 * x - d->width) * wide), up = pti_d_scale(pti_d_from(c->up), (d->height - 2 * y) * wide);
+    return pti_d_to(pti_d_add(pti_d_from(c->position), pti_d_scale(pti_d_add(pti_d_from(c->forward), pti_d_add(right, up)), near)));
+}
+
+/* Do all rays of pixels x0..x1 of row y start inside the shells? Those of the corners do, and what is inside has no dents. */
+static int pti_lock_row_inside(const pti_lockstep *k, const pt_render_desc *d, double x0, double x1, double y)
+{
+    const double rim = d->filter == PT_FILTER_BOX && !(d->filter_radius > 0) ? 0 : fmax(d->filter_radius, 8);
+    int i;
+    for (i = 0; i < 4; i++)
+        if (!pti_lock_inside(k, pti_camera_start(d, i & 1 ? x1 + rim : x0 - rim, i & 2 ? y + 1 + rim : y - rim))) return 0;
+    return 1;
+}
+
+/* A room of shells, seen from inside but for a rim of at most a tenth: rows there are left to paths one at a time. */
+static int pti_pick_shells(pti_lockstep *k, const pt_scene *scene, const pt_render_desc *d)
+{
+    const double w = d->width, h = d->height;
+    int i;
+    if (d->camera.lens_radius > 0 || !pti_lockstep_make_shells(k, scene, pti_camera_start(d, w / 2, h / 2))) return 0;
+    for (i = 0; i < 4; i++)
+        if (!pti_lock_inside(k, pti_camera_start(d, (i & 1 ? 0.95 : 0.05) * w, (i & 2 ? 0.95 : 0.05) * h))) return 0;
+    return 1;
+}
+
 /* Can paths walk together here? Then the scene is made ready for that, and *technique is the method's. */
 static int pti_pick_lockstep(const pt_method *method, const pt_scene *scene, const pt_render_desc *d, pti_lockstep *out, int *technique)
 {
@@ -13844,6 +14032,7 @@ static int pti_pick_lockstep(const pt_method *method, const pt_scene *scene, con
     if (d->no_lockstep || d->general_body || d->sampler == PT_SAMPLER_STRATIFIED) return 0;
     if (d->li.max_edges >= 1 << 24 || d->li.roulette_start >= 1 << 24) return 0; /* they are counted in floats */
     if (pti_lockstep_make(out, scene, eye)) return 1;
+    if (pti_pick_shells(out, scene, d)) return 1;
     return pti_lockstep_make_tree(out, scene, eye);
 }
 #endif
@@ -14374,16 +14563,19 @@ static void pti_render_tile(void *context, int index)
     pt_sampler sampler = pt_sampler_make(d->sampler, d->seed, p->planned);
     pt_li_info info;
     uint32_t s;
-    int x, y;
+    int x, y, together = y0, alone = y0; /* rows up to `together` and from `alone` on: paths one at a time  */
 #if PTI_HAS_LOCKSTEP
     if (p->lockstep) {
-        const int box[4] = {x0, y0, x1, y1};
-        pti_lock_tile(p, box, &sampler);
-        return;
+        int box[4] = {x0, y0, x1, y1};
+        while (box[1] < y1 && !pti_lock_row_inside(p->lockstep, d, x0, x1, box[1])) box[1]++;
+        while (box[3] > box[1] && !pti_lock_row_inside(p->lockstep, d, x0, x1, box[3] - 1)) box[3]--;
+        together = box[1];
+        alone = box[3];
+        if (together < alone) pti_lock_tile(p, box, &sampler);
     }
 #endif
     for (y = y0; y < y1; y++)
-        for (x = x0; x < x1; x++) {
+        for (x = x0; x < x1 && (y < together || y >= alone); x++) {
             info.rays = 0;
             for (s = p->begin; s < p->end && !PTI_LOAD(&p->cancel); s++) pti_render_sample(p, &sampler, x, y, s, &info);
             PTI_ADD(&p->rays, (pti_counter)info.rays);
@@ -15375,6 +15567,8 @@ PTDEF const pt_scene_entry *pt_scene_find(const char *name)
 /*
    VERSION HISTORY
 
+   0.6.4 (2026-11-23)  rooms whose walls are huge spheres are rendered in lockstep without a tree: smallpt's box in 0.2 of the
+                       time with AVX-512, 0.45 with SSE2.
    0.6.3 (2026-11-23)  spheres seen from inside are tried in the order of their far walls, and lockstep without lanes of walls
                        ends paths as early as one path at a time does: smallpt's box in 0.45 of the time.
    0.6.2 (2026-11-23)  the wide tree sorts short lists instead of binning them: 3 to 15 % less memory, rays of a room in 0.85

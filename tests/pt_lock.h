@@ -183,10 +183,10 @@ static inline double within(double bound) { return pt_test_long() ? 0.4 * bound 
 /* ---- rooms ------------------------------------------------------------------------------------------------ */
 
 /* Rooms [-1,1]^3 of coloured walls, and what is in them. */
-enum { SPHERES, GLASS_BOX, MANY_LAMPS, IN_GLASS, TURNED_LAMPS, GLOWING, MESH, METALS, SMOOTH, ROOMS };
+enum { SPHERES, GLASS_BOX, MANY_LAMPS, IN_GLASS, TURNED_LAMPS, GLOWING, MESH, METALS, SMOOTH, ROUND, ROOMS };
 static const char *const room_names[ROOMS] = {"mirror and glass sphere", "glass and mirror box", "many lamps", "eye in a glass sphere",
                                               "lamps from behind", "things that glow", "turned room of triangles", "metal, rough and smooth",
-                                              "smooth meshes"};
+                                              "smooth meshes", "room of huge spheres"};
 
 static inline void add_walls(pt_scene *s, int made, const place *at)
 {
@@ -197,6 +197,32 @@ static inline void add_walls(pt_scene *s, int made, const place *at)
     m[1] = m[4] = m[2] = diffuse(s, 0.5, 0.5, 0.4);
     m[5] = diffuse(s, 0.3, 0.3, 0.5);
     add_box(s, made, at, low, high, 0, m);
+}
+
+/* Walls that are spheres of radius r around the room, as those of smallpt's. */
+static inline void add_shells(pt_scene *s, const place *at, double r, const int material[6])
+{
+    int k;
+    for (k = 0; k < 6; k++) {
+        double c[3] = {0, 0, 0};
+        c[k % 3] = k < 3 ? r - 1 : 1 - r;
+        add_ball(s, at, c[0], c[1], c[2], r, material[k]);
+    }
+}
+
+/* A mirror, and a floor and a wall of metal; the lamp hangs through the ceiling, and most of it is outside. */
+static inline void add_round_room(pt_scene *s, const place *at)
+{
+    int m[6];
+    m[0] = diffuse(s, 0.6, 0.2, 0.1);
+    m[1] = pt_add_material(s, pt_material_conductor(rgb(0.14, 0.37, 1.44), rgb(3.98, 2.38, 1.6), (pt_real)0.5));
+    m[2] = pt_add_material(s, pt_material_mirror(rgb(0.7, 0.8, 0.7)));
+    m[3] = diffuse(s, 0.1, 0.5, 0.2);
+    m[4] = diffuse(s, 0.5, 0.5, 0.4);
+    m[5] = pt_add_material(s, pt_material_conductor(grey(1.5), grey(4), 0));
+    add_shells(s, at, 1e5, m);
+    add_ball(s, at, 0.1, 2.6, -0.2, 1.7, lamp(s, 4, 4, 3));
+    add_ball(s, at, -0.7, 0.2, 0.3, 0.1, lamp(s, 2, 1, 1));
 }
 
 static inline void add_lamp(pt_scene *s, const place *at, double x, double y, double z, double size, int up, int material)
@@ -248,10 +274,11 @@ static inline stage room_of(int kind, int by_tree)
     memset(&s, 0, sizeof s);
     glass = pt_add_material(&s.scene, pt_material_dielectric((pt_real)1.5));
     mirror = pt_add_material(&s.scene, pt_material_mirror(rgb(0.9, 0.8, 0.95)));
-    add_walls(&s.scene, kind == MESH ? FAN : kind == SPHERES ? QUAD : PARALLELOGRAM, at);
-    if (kind != GLOWING) add_lamp(&s.scene, at, -0.8, 0.98, -0.9, 1.6, 0, lamp(&s.scene, white, white, 0.8 * white));
+    if (kind == ROUND) add_round_room(&s.scene, at);
+    else add_walls(&s.scene, kind == MESH ? FAN : kind == SPHERES ? QUAD : PARALLELOGRAM, at);
+    if (kind != GLOWING && kind != ROUND) add_lamp(&s.scene, at, -0.8, 0.98, -0.9, 1.6, 0, lamp(&s.scene, white, white, 0.8 * white));
     s.camera = camera_at(at, 0.1, 0.1, 0.95, -0.05, -0.1, -1, 65);
-    if (kind == SPHERES) {
+    if (kind == SPHERES || kind == ROUND) {
         add_ball(&s.scene, at, -0.5, -0.6, -0.4, 0.4, mirror);
         add_ball(&s.scene, at, 0.5, -0.5, 0, 0.4, glass);
     }

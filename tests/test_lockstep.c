@@ -1577,6 +1577,7 @@ static void layers(void)
 {
     layers_of(SPHERES);
     layers_of(IN_GLASS); /* seen from behind */
+    layers_of(ROUND);
     layers_of(SMOOTH); /* by its tree, and walls in lanes */
 }
 
@@ -1735,6 +1736,179 @@ static void tilted_lamp(void)
     pt_scene_free(&s.scene);
 }
 
+/* ---- walls that are huge spheres ------------------------------------------------------------------------------- */
+
+/* A room of six of them, each of a colour of its own (number / 128), with balls that stand on the floor, in a corner, and in a wall. */
+static stage round_room(const place *at, double r, int with_balls)
+{
+    stage s;
+    int m[6], i;
+    memset(&s, 0, sizeof s);
+    for (i = 0; i < 6; i++) m[i] = diffuse(&s.scene, (i + 1) / 128.0, 0.999, 0.999);
+    add_shells(&s.scene, at, r, m);
+    if (with_balls) {
+        add_ball(&s.scene, at, 0.3, -0.7, -0.4, 0.3, pt_add_material(&s.scene, pt_material_mirror(grey(0.999))));
+        add_ball(&s.scene, at, -0.5, -0.6, 0, 0.4, pt_add_material(&s.scene, pt_material_dielectric((pt_real)1.5)));
+        add_ball(&s.scene, at, 0.8, 0.8, 0.8, 0.2, m[0]);
+        add_ball(&s.scene, at, -1.1, 0.5, 0.4, 0.35, m[1]);
+    }
+    s.camera = camera_at(at, 0.1, 0, 0.8, 0, 0.05, -1, 70);
+    commit(&s);
+    return s;
+}
+
+/* Not one path gets out: all walk to their last edge. */
+static void shells_are_closed(void)
+{
+    static const struct {
+        place at;
+        double r;
+    } rooms[8] = {{{0, 1, 0, 0, 0}, 64},      {{0, 1, 0, 0, 0}, 1e3},      {{0, 1, 0, 0, 0}, 1e5},     {{0, 1, 0.3, -0.1, 0.2}, 1e5},
+                  {{0, 1, 0, 0, 0}, 8388608}, {{0, 1, 7, -4, 3}, 1e4}, {{0, 1e-6, 2e-7, 0, 0}, 1e4}, {{0, 1e6, 0, 0, 0}, 1e4}};
+    double edges = 0;
+    int i, k;
+    for (i = 0; i < 8; i++) {
+        stage s = round_room(&rooms[i].at, rooms[i].r, 1);
+        pt_render_desc d = desc_of(&s, 29, 23, pt_test.is_short ? 2 : WHOLE ? 16 : 4);
+        const double paths = 29.0 * 23 * d.spp;
+        d.li.roulette = PT_ROULETTE_NONE;
+        for (k = 2; k <= 500; k *= 250) {
+            uint64_t rays;
+            pt_film film;
+            d.method = "path-plain";
+            d.li.max_edges = k;
+            film = render(&s, &d, 1, &rays);
+            pt_check((double)rays == paths * k, label("room %d of huge spheres, %d edges", i, k), "%.0f of %.0f are missing", paths * k - (double)rays, paths * k);
+            edges += (double)rays;
+            pt_film_free(&film);
+        }
+        pt_scene_free(&s.scene);
+    }
+    printf("edges walked in rooms of huge spheres: %.4g\n", edges);
+}
+
+/* Points that lanes find are on their spheres, of whose roots in double they are; lamps within are seen, those behind are not. */
+static void shell_hits(void)
+{
+    static const double radius[4] = {512, 1e4, 1e5, 8388608};
+    pt_pcg32 rng = pt_pcg32_make(pt_test_seed(61), 8);
+    int n, i, j, k, rays = 0, off = 0, other = 0, turned = 0, unsure = 0, blind = 0;
+    double worst = 0;
+    for (n = 0; n < 4; n++) {
+        stage s = round_room(&HERE, radius[n], 0);
+        pti_lockstep ready;
+        if (!pti_lockstep_make_shells(&ready, &s.scene, v3(0, 0, 0))) {
+            pt_check(0, "shells", "not for lanes");
+            return;
+        }
+        for (i = 0; i < (int)pt_test_samples(2000); i++) {
+            pti_lane_row o[3], d[3], p[3], normal[3], number, end;
+            pti_lock_best best;
+            pti_lock_surface surface;
+            unsigned hidden;
+            for (k = 0; k < PTI_WIDTH; k++) {
+                /* anywhere, on a plane in front of a wall, or where rounding may put what is on a wall */
+                const double edge = i % 3 == 1 ? 0.9 : 1 - 1.01 / radius[n] - 1e-5, y = between(&rng, -edge, edge), z = between(&rng, -edge, edge);
+                const double wall = 1 - (y * y + z * z) / (radius[n] + sqrt(radius[n] * radius[n] - y * y - z * z));
+                if (i % 3 == 2) set3(o, k, v3(wall + between(&rng, -1, 1) * (double)ready.e, y, z));
+                else set3(o, k, v3(i % 3 == 1 ? between(&rng, -edge, edge) : edge, y, z));
+                set3(d, k, any_direction(&rng));
+                end.v[k] = (float)between(&rng, 0, 4);
+            }
+            pti_lock_nearest(&ready, pti_row3(o), pti_row3(d), ready.e, &best);
+            pti_row3_set(normal, pti_lock_land(&ready, pti_row3(o), pti_row3(d), &best, &surface));
+            pti_row3_set(p, surface.p);
+            number.f = best.i;
+            hidden = pti_mw_bits(pti_lock_any(&ready, pti_row3(o), pti_row3(d), end.f));
+            for (k = 0; k < PTI_WIDTH; k++) {
+                const int found = (int)(128 * ready.of[PTI_OF_ALBEDO][(int)number.v[k]] + 0.5f) - 1;
+                double height, most = -HUGE_VAL, least = HUGE_VAL;
+                pti_d3 out;
+                const pti_d3 end_of_ray = pti_d_add(get3(o, k), pti_d_scale(get3(d, k), (double)end.v[k]));
+                for (j = 0; j < 6; j++) {
+                    const pti_d3 centre = pti_d_from(s.scene.spheres[j].centre);
+                    const double r = (double)s.scene.spheres[j].radius;
+                    height = pti_d_length(pti_d_sub(get3(p, k), centre)) - r;
+                    if (j == found) off += !(fabs(height) <= (double)ready.e), worst = fmax(worst, fabs(height) / (double)ready.e);
+                    most = fmax(most, height);
+                    least = fmin(least, r - pti_d_length(pti_d_sub(end_of_ray, centre)));
+                }
+                out = pti_d_sub(get3(p, k), pti_d_from(s.scene.spheres[found].centre));
+                rays++;
+                other += !(most <= 2 * (double)ready.e);
+                turned += !(pti_d_dot(pti_d_normalize(out), get3(normal, k)) > 1 - 1e-6);
+                unsure += fabs(least) <= (double)ready.e;
+                blind += fabs(least) > (double)ready.e && (hidden >> k & 1) != (least < 0);
+            }
+        }
+        pt_scene_free(&s.scene);
+    }
+    pt_check(off == 0, "shells", "%d of %d points are farther off than e; at most %.3g e", off, rays, worst);
+    pt_check(other == 0, "shells", "%d of %d points are behind another one", other, rays);
+    pt_check(turned == 0, "shells", "%d of %d normals are not those of the sphere", turned, rays);
+    pt_check(blind == 0 && unsure < rays / 1000, "shells", "%d of %d shadow rays are wrong, %d too close to call", blind, rays, unsure);
+    if (pt_test.is_verbose) printf("       %d rays, points off by %.3g e\n", rays, worst);
+}
+
+/* Rooms that are left to the tree. */
+static void no_shells(void)
+{
+    enum { SHARP_EDGE, GLASS_WALL, LENS, GLOWING_WALL, FLAT_THING, EYE_OUTSIDE, TOO_WIDE, ASKEW, WAYS };
+    static const char *const names[WAYS] = {"walls that meet at 5 degrees", "a wall of glass",       "a camera with a lens", "a wall that glows", "a flat thing in it",
+                                            "a camera half outside",        "too large for a height", "turned against the axes"};
+    static const place turned = {0.7, 1, 0, 0, 0};
+    int what;
+    for (what = 0; what < WAYS; what++) {
+        const double r = 1e4, wide = 1073741824, tilt = 5 * PT_PI / 180, above = cos(tilt) - 0.9 * sin(tilt);
+        stage s = round_room(what == ASKEW ? &turned : &HERE, r, 1);
+        pt_render_desc d;
+        pt_film film;
+        if (what == SHARP_EDGE) {
+            add_ball(&s.scene, &HERE, (r + above) * sin(tilt), -(r + above) * cos(tilt), 0, r, 0);
+            s.camera = camera_at(&HERE, 0.9, -0.95, 0.8, 0.9, -0.95, -1, 5);
+        }
+        if (what == TOO_WIDE) add_ball(&s.scene, &HERE, wide, 0, 0, wide, 0);
+        if (what == GLASS_WALL) add_ball(&s.scene, &HERE, 0, 1.1 - r, 0, r, pt_add_material(&s.scene, pt_material_dielectric((pt_real)1.5)));
+        if (what == GLOWING_WALL) add_ball(&s.scene, &HERE, 0, 1.1 - r, 0, r, material_of(&s.scene, pt_material_diffuse(grey(0.5)), 1));
+        if (what == FLAT_THING) pt_add_triangle(&s.scene, v3(-0.9, 0.9, 0), v3(0, 0.9, 0), v3(0, 0.9, 0.9), 0);
+        commit(&s);
+        d = desc_of(&s, 12, 9, 2);
+        d.li.max_edges = 9;
+        if (what == LENS) d.camera.lens_radius = (pt_real)0.01, d.camera.focus_distance = 1;
+        if (what == EYE_OUTSIDE) d.camera.near_distance = (pt_real)1.7;
+        film = render(&s, &d, what == GLOWING_WALL ? -1 : 2, NULL);
+        pt_film_free(&film);
+        pt_scene_free(&s.scene);
+        if (pt_test.is_verbose) printf("       %s\n", names[what]);
+    }
+}
+
+/* Rows of which some rays start outside are those of paths one at a time; the others are not. */
+static void shell_rows(void)
+{
+    stage s;
+    pt_render_desc d;
+    pt_film film, plain;
+    int y, k, same[2] = {0, 0};
+    memset(&s, 0, sizeof s);
+    pt_check(pt_scene_smallpt(&s.scene, &s.camera) == PT_OK, "smallpt", "cannot be made");
+    d = desc_of(&s, 256, 256, 2);
+    d.li.max_edges = 6;
+    d.tile = 48;
+    film = render(&s, &d, 1, NULL);
+    d.no_lockstep = 1;
+    plain = render(&s, &d, 0, NULL);
+    for (y = 0; y < 256; y++) {
+        int equal = 1;
+        for (k = 0; k < 2; k++) equal &= memcmp(film.half[k] + 768 * y, plain.half[k] + 768 * y, 768 * sizeof(double)) == 0;
+        same[y > 1] += equal;
+    }
+    pt_check(same[0] == 2 && same[1] == 0, "rows that start outside", "%d of the first 2 rows, and %d of the others, are those of paths one at a time", same[0], same[1]);
+    pt_film_free(&film);
+    pt_film_free(&plain);
+    pt_scene_free(&s.scene);
+}
+
 /* Just inside of what it takes. */
 static void taken(void)
 {
@@ -1791,6 +1965,8 @@ static int lockstep(int argc, char **argv)
 #endif
     PT_TEST_EXACT(no_way_out);
     PT_TEST_EXACT(furnished_rooms);
+    PT_TEST_EXACT(shells_are_closed);
+    PT_TEST_EXACT(shell_hits);
     if (WHOLE) {
         PT_TEST(furnaces);
         PT_TEST(irradiance);
@@ -1801,6 +1977,8 @@ static int lockstep(int argc, char **argv)
         PT_TEST_EXACT(refused);
         PT_TEST_EXACT(layers);
         PT_TEST_EXACT(taken);
+        PT_TEST_EXACT(no_shells);
+        PT_TEST_EXACT(shell_rows);
         PT_TEST_EXACT(walls_left_to_the_tree);
         PT_TEST_EXACT(behind_surfaces);
         PT_TEST_EXACT(behind_normals);
